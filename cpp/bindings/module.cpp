@@ -1,0 +1,23 @@
+// The extension module: one bind_<stage> per stage, and the translation of core errors.
+#include "arrays.hpp"
+
+namespace stretchmap::bindings {
+void bind_mesh(py::module_& m);
+}  // namespace stretchmap::bindings
+
+PYBIND11_MODULE(_core, m) {
+  using namespace stretchmap::bindings;
+  m.doc() = "C++ core of stretchmap; private, its arguments are validated by the Python layer.";
+
+  py::register_exception_translator([](std::exception_ptr pointer) {
+    try {
+      if (pointer) std::rethrow_exception(pointer);
+    } catch (const stretchmap::Error& error) {
+      const py::object type = py::module_::import("stretchmap.errors").attr(error.kind.c_str());
+      const py::object value = type(error.what(), py::arg("ids") = error.ids);
+      PyErr_SetObject(type.ptr(), value.ptr());
+    }
+  });
+
+  bind_mesh(m);
+}
