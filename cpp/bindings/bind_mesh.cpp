@@ -1,9 +1,24 @@
 #include "arrays.hpp"
+#include "stretchmap/mesh/facets.hpp"
+#include "stretchmap/mesh/orient.hpp"
+#include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
+#include "stretchmap/mesh/tet_boundary.hpp"
 
 namespace stretchmap::bindings {
+namespace {
 
-void bind_mesh(py::module_& m) {
+IndexVec misoriented_faces(const PointsRef& points, const FacesRef& faces) {
+  const FacetGroups groups = group_half_edges(faces, static_cast<Index>(points.rows()));
+  return set_entries(faces_to_turn(points, faces, face_patches(faces, groups)));
+}
+
+IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets) {
+  const FacetGroups groups = group_half_faces(tets, static_cast<Index>(points.rows()));
+  return set_entries(tets_to_turn(points, tets, tet_patches(tets, groups)));
+}
+
+void bind_topology(py::module_& m) {
   py::class_<SurfaceTopology>(m, "SurfaceTopology")
       .def(py::init([](const FacesRef& faces, Index n) { return surface_topology(faces, n); }),
            py::arg("faces").noconvert(), py::arg("n_vertices"), release_gil())
@@ -14,6 +29,37 @@ void bind_mesh(py::module_& m) {
       .def_readonly("edges", &SurfaceTopology::edges)
       .def_readonly("edge_halfedge", &SurfaceTopology::edge_halfedge)
       .def_readonly("vertex_halfedge", &SurfaceTopology::vertex_halfedge);
+
+  py::class_<TetBoundary>(m, "TetBoundary")
+      .def(py::init([](const TetsRef& tets, Index n) { return tet_boundary(tets, n); }),
+           py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil())
+      .def_readonly("faces", &TetBoundary::faces)
+      .def_readonly("vertices", &TetBoundary::vertices)
+      .def_readonly("index", &TetBoundary::index)
+      .def_readonly("tets", &TetBoundary::tets);
+
+  m.def("tet_neighbours", &tet_neighbours, py::arg("tets").noconvert(), py::arg("n_vertices"),
+        release_gil());
+  m.def("tet_edges", &tet_edges, py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil());
+}
+
+void bind_sizes(py::module_& m) {
+  const auto points = py::arg("points").noconvert();
+  const auto faces = py::arg("faces").noconvert();
+  const auto tets = py::arg("tets").noconvert();
+  m.def("face_area_vectors", &face_area_vectors, points, faces, release_gil());
+  m.def("face_areas", &face_areas, points, faces, release_gil());
+  m.def("tet_volumes", &tet_volumes, points, tets, release_gil());
+  m.def("enclosed_volume", &enclosed_volume, points, faces, release_gil());
+  m.def("misoriented_faces", &misoriented_faces, points, faces, release_gil());
+  m.def("misoriented_tets", &misoriented_tets, points, tets, release_gil());
+}
+
+}  // namespace
+
+void bind_mesh(py::module_& m) {
+  bind_topology(m);
+  bind_sizes(m);
 }
 
 }  // namespace stretchmap::bindings

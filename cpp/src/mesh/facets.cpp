@@ -1,0 +1,116 @@
+#include "stretchmap/mesh/facets.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+namespace stretchmap {
+namespace {
+
+struct Key {
+  std::uint64_t high;  // the second (and third) lowest vertex
+  std::uint64_t low;   // the fourth lowest vertex, for whole tets
+  Index facet;
+};
+
+bool same(const Key& a, const Key& b) { return a.high == b.high && a.low == b.low; }
+
+bool before(const Key& a, const Key& b) {
+  if (a.high != b.high) return a.high < b.high;
+  if (a.low != b.low) return a.low < b.low;
+  return a.facet < b.facet;
+}
+
+// corners(facet) returns the ids of a facet in any order; `used(facet)` says whether it counts.
+// Counting sort by the lowest id, then a short sort inside each bucket.
+template <std::size_t N, class Corners, class Used>
+FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used) {
+  std::vector<Index> bucket(static_cast<std::size_t>(n_vertices) + 1, 0);
+  for (Index h = 0; h < n_facets; ++h) {
+    if (!used(h)) continue;
+    const std::array<Index, N> c = corners(h);
+    ++bucket[*std::min_element(c.begin(), c.end()) + 1];
+  }
+  for (Index i = 0; i < n_vertices; ++i) bucket[i + 1] += bucket[i];
+  std::vector<Key> keys(bucket[n_vertices]);
+  std::vector<Index> cursor(bucket.begin(), bucket.end() - 1);
+  for (Index h = 0; h < n_facets; ++h) {
+    if (!used(h)) continue;
+    std::array<Index, N> c = corners(h);
+    std::sort(c.begin(), c.end());
+    Key key{static_cast<std::uint64_t>(c[1]) << 32, 0, h};
+    if constexpr (N > 2) key.high |= static_cast<std::uint64_t>(c[2]);
+    if constexpr (N > 3) key.low = static_cast<std::uint64_t>(c[3]);
+    keys[cursor[c[0]]++] = key;
+  }
+  FacetGroups groups;
+  groups.order.resize(keys.size());
+  groups.start.reserve(keys.size() / 2 + 1);
+  for (Index i = 0; i < n_vertices; ++i) {
+    std::sort(keys.begin() + bucket[i], keys.begin() + bucket[i + 1], before);
+    for (Index p = bucket[i]; p < bucket[i + 1]; ++p) {
+      if (p == bucket[i] || !same(keys[p - 1], keys[p])) groups.start.push_back(p);
+      groups.order[p] = keys[p].facet;
+    }
+  }
+  groups.start.push_back(static_cast<Index>(keys.size()));
+  return groups;
+}
+
+}  // namespace
+
+FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip) {
+  return group<2>(
+      static_cast<Index>(3 * faces.rows()), n_vertices,
+      [&](Index h) {
+        return std::array<Index, 2>{faces(h / 3, h % 3), faces(h / 3, (h + 1) % 3)};
+      },
+      [&](Index h) { return skip.empty() || !skip[h / 3]; });
+}
+
+FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip) {
+  return group<3>(
+      static_cast<Index>(4 * tets.rows()), n_vertices,
+      [&](Index h) {
+        const auto f = half_face(tets, h);
+        return std::array<Index, 3>{f[0], f[1], f[2]};
+      },
+      [&](Index h) { return skip.empty() || !skip[h / 4]; });
+}
+
+FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip) {
+  return group<2>(
+      static_cast<Index>(6 * tets.rows()), n_vertices,
+      [&](Index h) {
+        const int* corner = kTetEdge[h % 6];
+        return std::array<Index, 2>{tets(h / 6, corner[0]), tets(h / 6, corner[1])};
+      },
+      [&](Index h) { return skip.empty() || !skip[h / 6]; });
+}
+
+FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices) {
+  return group<3>(
+      static_cast<Index>(faces.rows()), n_vertices,
+      [&](Index f) {
+        return std::array<Index, 3>{faces(f, 0), faces(f, 1), faces(f, 2)};
+      },
+      [](Index) { return true; });
+}
+
+FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices) {
+  return group<4>(
+      static_cast<Index>(tets.rows()), n_vertices,
+      [&](Index t) {
+        return std::array<Index, 4>{tets(t, 0), tets(t, 1), tets(t, 2), tets(t, 3)};
+      },
+      [](Index) { return true; });
+}
+
+int same_turn(const Eigen::Matrix<Index, 1, 3>& a, const Eigen::Matrix<Index, 1, 3>& b) {
+  for (int k = 0; k < 3; ++k) {
+    if (b[k] == a[0]) return b[(k + 1) % 3] == a[1] ? 1 : -1;
+  }
+  return 0;
+}
+
+}  // namespace stretchmap

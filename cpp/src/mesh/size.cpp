@@ -1,0 +1,90 @@
+#include "stretchmap/mesh/size.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace stretchmap {
+namespace {
+
+constexpr double kFlat = 1e-12;
+constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
+
+template <class Elements>
+double longest_edge(const PointsRef& points, const Elements& elements, Index e) {
+  double longest = 0;
+  for (Index i = 0; i < elements.cols(); ++i) {
+    for (Index j = 0; j < i; ++j) {
+      longest = std::max(longest,
+                         (points.row(elements(e, i)) - points.row(elements(e, j))).squaredNorm());
+    }
+  }
+  return std::sqrt(longest);
+}
+
+}  // namespace
+
+Points face_area_vectors(const PointsRef& points, const FacesRef& faces) {
+  Points vectors(faces.rows(), 3);
+  for (Index f = 0; f < faces.rows(); ++f) {
+    const Eigen::RowVector3d a = points.row(faces(f, 0));
+    const Eigen::RowVector3d b = points.row(faces(f, 1)) - a;
+    const Eigen::RowVector3d c = points.row(faces(f, 2)) - a;
+    vectors.row(f) = 0.5 * b.cross(c);
+  }
+  return vectors;
+}
+
+Vec face_areas(const PointsRef& points, const FacesRef& faces) {
+  return face_area_vectors(points, faces).rowwise().norm();
+}
+
+Vec tet_volumes(const PointsRef& points, const TetsRef& tets) {
+  Vec volumes(tets.rows());
+  for (Index t = 0; t < tets.rows(); ++t) {
+    const Eigen::RowVector3d a = points.row(tets(t, 0));
+    const Eigen::RowVector3d b = points.row(tets(t, 1)) - a;
+    const Eigen::RowVector3d c = points.row(tets(t, 2)) - a;
+    const Eigen::RowVector3d d = points.row(tets(t, 3)) - a;
+    volumes[t] = b.cross(c).dot(d) / 6;
+  }
+  return volumes;
+}
+
+double enclosed_volume(const PointsRef& points, const FacesRef& faces) {
+  const Eigen::RowVector3d centre = points.colwise().mean();
+  double volume = 0;
+  for (Index f = 0; f < faces.rows(); ++f) {
+    const Eigen::RowVector3d a = points.row(faces(f, 0)) - centre;
+    const Eigen::RowVector3d b = points.row(faces(f, 1)) - centre;
+    const Eigen::RowVector3d c = points.row(faces(f, 2)) - centre;
+    volume += a.cross(b).dot(c);
+  }
+  return volume / 6;
+}
+
+Eigen::Array<bool, Eigen::Dynamic, 1> degenerate_faces(const PointsRef& points,
+                                                       const FacesRef& faces) {
+  const double rounding = kRounding * points.cwiseAbs().maxCoeff();
+  const Vec areas = face_areas(points, faces);
+  Eigen::Array<bool, Eigen::Dynamic, 1> flat(faces.rows());
+  for (Index f = 0; f < faces.rows(); ++f) {
+    const double edge = longest_edge(points, faces, f);
+    flat[f] = !(2 * areas[f] > std::max(kFlat * edge, rounding) * edge);
+  }
+  return flat;
+}
+
+Eigen::Array<bool, Eigen::Dynamic, 1> degenerate_tets(const PointsRef& points,
+                                                      const TetsRef& tets) {
+  const double rounding = kRounding * points.cwiseAbs().maxCoeff();
+  const Vec volumes = tet_volumes(points, tets);
+  Eigen::Array<bool, Eigen::Dynamic, 1> flat(tets.rows());
+  for (Index t = 0; t < tets.rows(); ++t) {
+    const double edge = longest_edge(points, tets, t);
+    flat[t] = !(6 * std::abs(volumes[t]) > std::max(kFlat * edge, rounding) * edge * edge);
+  }
+  return flat;
+}
+
+}  // namespace stretchmap

@@ -1,0 +1,72 @@
+"""Fixtures shared by all stages: the meshes on disk, skipped with a reason when absent."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stretchmap.mesh import TetMesh, TriMesh
+
+_ROOT = Path(__file__).resolve().parents[2]
+_MESHES = Path(os.environ.get("STRETCHMAP_MESHES", _ROOT.parent / "shared" / "meshes"))
+
+
+def _need(path: Path) -> Path:
+    if not path.exists():
+        pytest.skip(f"{path} is not there; set STRETCHMAP_MESHES to the folder of test meshes")
+    return path
+
+
+@lru_cache(maxsize=8)
+def _solid(name: str) -> TetMesh:
+    with np.load(_MESHES / "tets" / f"{name}.npz") as data:
+        return TetMesh(data["V"], data["T"])
+
+
+@lru_cache(maxsize=8)
+def _surface(name: str) -> TriMesh:
+    """Read the one layout the test surfaces have: binary little-endian PLY of doubles."""
+    raw = (_MESHES / "surfaces" / f"{name}.ply").read_bytes()
+    header, _, body = raw.partition(b"end_header\n")
+    counts = {
+        words[1]: int(words[2])
+        for words in (line.split() for line in header.decode().splitlines())
+        if words[:1] == ["element"]
+    }
+    n, m = counts["vertex"], counts["face"]
+    face = np.dtype([("count", "u1"), ("ids", "<i4", 3)])
+    points = np.frombuffer(body, "<f8", 3 * n).reshape(n, 3)
+    return TriMesh(points, np.frombuffer(body, face, m, offset=24 * n)["ids"])
+
+
+@pytest.fixture(scope="session")
+def mesh_dir() -> Path:
+    """Folder with ``surfaces`` and ``tets``; skips when there is none."""
+    return _need(_MESHES)
+
+
+@pytest.fixture(scope="session")
+def load_surface() -> Callable[[str], TriMesh]:
+    """Return a loader of ``surfaces/NAME.ply``; skips when the file is absent."""
+
+    def load(name: str) -> TriMesh:
+        _need(_MESHES / "surfaces" / f"{name}.ply")
+        return _surface(name)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def load_solid() -> Callable[[str], TetMesh]:
+    """Return a loader of ``tets/NAME.npz``; skips when the file is absent."""
+
+    def load(name: str) -> TetMesh:
+        _need(_MESHES / "tets" / f"{name}.npz")
+        return _solid(name)
+
+    return load
