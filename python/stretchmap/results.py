@@ -1,0 +1,406 @@
+"""What every result shares: iteration records, the table, JSON, and map files that come back.
+
+A map file is an ``.npz`` with ``V``, ``F`` or ``T``, ``image`` (n, 3), further named arrays, and
+``meta``, a JSON text of all scalars, the history and the versions. Every writer here writes to a
+temporary file first and renames it, so a failure leaves no file behind.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import platform
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FileFormatError
+from .torus import Torus
+
+if TYPE_CHECKING:
+    from .measures import Distortion
+    from .mesh import TetMesh, TriMesh
+
+__all__ = ["IterationRecord", "LoadedMap", "MapResult", "load_map", "versions"]
+
+NAN = math.nan
+
+
+@dataclass(frozen=True)
+class IterationRecord:
+    """One step of an iteration; what a method does not compute stays NaN (``flips`` -1).
+
+    Attributes
+    ----------
+    stage : str
+        ``"sem"``, ``"newton"``, ``"vsem"``, ``"untangle"``, ...
+    iteration : int
+        Counted from 0 (the start) within the stage.
+    energy : float
+        Value of what the stage minimises.
+    step : float
+        Length of the step or of the line search.
+    residual : float
+        Gradient norm or whatever the stage stops on.
+    flips : int
+        Number of elements with the wrong sign.
+    ring_sd, element_sd : float
+        Standard deviation of the per-vertex ratios (6.3)/(6.5) and of the per-element ratios.
+    seconds : float
+        Since the start of the stage.
+    """
+
+    stage: str
+    iteration: int
+    energy: float = NAN
+    step: float = NAN
+    residual: float = NAN
+    flips: int = -1
+    ring_sd: float = NAN
+    element_sd: float = NAN
+    seconds: float = NAN
+
+
+class MapResult:
+    """Mixin for the frozen dataclasses that hold a map.
+
+    The dataclass defines the attributes ``image (n, 3)``, ``torus`` (or None), ``history`` (tuple
+    of :class:`IterationRecord`), ``distortion``, ``converged``, ``stop_reason``, ``seconds`` (dict
+    from stage to seconds), and its source mesh as ``solid`` or ``surface``. It may define
+    ``certificate`` and ``energy``, and overrides :meth:`extra_arrays` and :meth:`extra_scalars`
+    for what is its own.
+    """
+
+    title = "map"
+
+    if TYPE_CHECKING:
+        image: NDArray[np.float64]
+        torus: Torus | None
+        history: tuple[IterationRecord, ...]
+        distortion: Distortion
+        converged: bool
+        stop_reason: str
+        seconds: Mapping[str, float]
+
+    @property
+    def mesh(self) -> TriMesh | TetMesh:
+        """The source mesh; row i of ``image`` is its vertex i."""
+        solid = getattr(self, "solid", None)
+        return self.surface if solid is None else solid  # type: ignore[attr-defined]
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """Further arrays to be kept in a map file, by name."""
+        return {}
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """Further entries of the report, JSON-compatible, by name."""
+        return {}
+
+    def to_dict(self, history: bool = False) -> dict[str, Any]:
+        """Everything scalar about the map, ready for JSON.
+
+        Parameters
+        ----------
+        history : bool
+            Add the list of iteration records.
+        """
+        mesh = self.mesh
+        d = self.distortion
+        energy = getattr(self, "energy", None)
+        out: dict[str, Any] = {
+            "kind": self.title,
+            "n_vertices": len(mesh.V),
+            "n_elements": len(elements(mesh)),
+            "element": "tet" if hasattr(mesh, "T") else "face",
+            "flips": d.flips,
+            "ring_mean": d.ring_mean,
+            "ring_sd": d.ring_sd,
+            "element_mad": d.element_mad,
+            "element_sd": d.element_sd,
+            "ratio_min": d.ratio_min,
+            "ratio_max": d.ratio_max,
+            "total_distortion": d.total_distortion,
+            "angle_mean": d.angle_mean,
+            "angle_max": d.angle_max,
+            "energy": d.stretch_energy if energy is None else energy,
+            "energy_bound": d.stretch_bound,
+            "iterations": sum(1 for record in self.history if record.iteration > 0),
+            "converged": self.converged,
+            "stop_reason": self.stop_reason,
+            "seconds": dict(self.seconds),
+            "torus": None if self.torus is None else {"R": self.torus.R, "r": self.torus.r},
+            "versions": versions(),
+        }
+        certificate = getattr(self, "certificate", None)
+        if certificate is not None:
+            out["certified"] = certificate.certified
+            out["certificate"] = certificate.to_dict()
+        out.update(self.extra_scalars())
+        if history:
+            out["history"] = [dataclasses.asdict(record) for record in self.history]
+        return plain(out)
+
+    def to_json(self, history: bool = False, indent: int | None = 2) -> str:
+        """:meth:`to_dict` as JSON text; what is not finite becomes ``null``."""
+        return json.dumps(self.to_dict(history), indent=indent, allow_nan=False)
+
+    def summary(self) -> str:
+        """A table of the map's figures."""
+        rows = self.to_dict()
+        seconds = rows.pop("seconds")
+        torus = rows.pop("torus")
+        certificate = rows.pop("certificate", None)
+        rows.pop("versions")
+        if torus is not None:
+            rows["torus"] = f"R = {torus['R']:.6g}, r = {torus['r']:.6g}"
+        if certificate is not None and not certificate["certified"]:
+            rows["certified"] = f"no: {certificate['reason']}"
+        for stage, value in seconds.items():
+            rows[f"seconds, {stage}"] = value
+        return table(rows)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the map to a file.
+
+        Parameters
+        ----------
+        path : path-like
+            ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``: the source mesh with
+            ``image`` as point data and the ratios as cell data. ``.obj``, ``.ply`` and the other
+            formats of :func:`stretchmap.write`: the image of the surface.
+
+        Raises
+        ------
+        FileFormatError
+            If the suffix is not known or the format cannot hold the mesh.
+        OSError
+            If the file cannot be written.
+        """
+        path = Path(path)
+        ratios = {"ratio": self.distortion.ratios}
+        if path.suffix.lower() == ".npz":
+            self._save_npz(path)
+        elif path.suffix.lower() in (".vtu", ".vtk"):
+            from .io import write
+
+            arrays = {"image": self.image, "ring_ratio": self.distortion.ring_ratios}
+            n = len(self.mesh.V)
+            arrays.update((k, a) for k, a in self.extra_arrays().items() if a.shape[:1] == (n,))
+            write(path, self.mesh, point_data=arrays, cell_data=ratios)
+        else:
+            from .io import write
+            from .mesh import TriMesh
+
+            mesh = self.mesh
+            if hasattr(mesh, "T"):
+                surface = mesh.surface
+                write(path, TriMesh(self.image[mesh.boundary_vertices], surface.F))
+            else:
+                write(path, TriMesh(self.image, mesh.F), cell_data=ratios)
+
+    def _save_npz(self, path: Path) -> None:
+        mesh = self.mesh
+        arrays = {
+            "V": mesh.V,
+            "T" if hasattr(mesh, "T") else "F": elements(mesh),
+            "image": self.image,
+            "ratios": self.distortion.ratios,
+            "ring_ratios": self.distortion.ring_ratios,
+            **self.extra_arrays(),
+        }
+        meta = json.dumps(self.to_dict(history=True), allow_nan=False)
+        with atomic_path(path) as temporary, open(temporary, "wb") as file:
+            np.savez_compressed(file, meta=np.array(meta), **arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedMap(MapResult):
+    """A map read back from a file, whoever wrote it.
+
+    Attributes
+    ----------
+    solid, surface : TetMesh or TriMesh, or None
+        The source mesh; one of them is None.
+    image : ndarray, shape (n, 3)
+    torus : Torus or None
+        None when the file names none.
+    arrays : dict
+        All further arrays of the file.
+    meta : dict
+        The scalars stored with it; empty for a file of another program.
+    history, converged, stop_reason, seconds
+        As in the result that was saved.
+    """
+
+    solid: TetMesh | None
+    surface: TriMesh | None
+    image: NDArray[np.float64]
+    torus: Torus | None
+    arrays: dict[str, NDArray[Any]] = field(repr=False)
+    meta: dict[str, Any] = field(repr=False)
+    history: tuple[IterationRecord, ...] = field(repr=False)
+    converged: bool
+    stop_reason: str
+    seconds: Mapping[str, float]
+
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        """Kind of map, as stored."""
+        return str(self.meta.get("kind", "map"))
+
+    @property
+    def distortion(self) -> Distortion:  # type: ignore[override]
+        """Measured anew from the mesh and the image."""
+        from .measures import distortion
+
+        return distortion(self.mesh, self.image, torus=self.torus, angles=self.arrays.get("angles"))
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays the file held beyond the common ones."""
+        return {k: a for k, a in self.arrays.items() if k not in ("ratios", "ring_ratios")}
+
+
+def load_map(path: str | os.PathLike[str]) -> LoadedMap:
+    """Read a map file written by :meth:`MapResult.save` or by somebody else.
+
+    Parameters
+    ----------
+    path : path-like
+        An ``.npz`` with ``V (n, 3)``, ``F`` or ``T``, and ``image (n, 3)``.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not such an ``.npz``.
+    MeshError
+        If the mesh in it is invalid.
+    OSError
+        If it cannot be opened.
+    """
+    from .mesh import TetMesh, TriMesh
+
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise FileFormatError(f"{path} is not a readable .npz file: {error}") from None
+    missing = [key for key in ("V", "image") if key not in arrays]
+    if missing or ("F" in arrays) == ("T" in arrays):
+        raise FileFormatError(f"{path} must hold V, image and either F or T; it has {list(arrays)}")
+    meta = _read_meta(path, arrays.pop("meta", None))
+    V, image = arrays.pop("V"), np.asarray(arrays.pop("image"), float)
+    if image.shape != V.shape:
+        raise FileFormatError(f"{path}: image has shape {image.shape}, V {V.shape}")
+    solid = TetMesh(V, arrays.pop("T")) if "T" in arrays else None
+    surface = TriMesh(V, arrays.pop("F")) if "F" in arrays else None
+    torus = meta.get("torus")
+    return LoadedMap(
+        solid=solid,
+        surface=surface,
+        image=image,
+        torus=None if torus is None else Torus(torus["R"], torus["r"]),
+        arrays=arrays,
+        meta=meta,
+        history=tuple(_read_record(record) for record in meta.get("history", ())),
+        converged=bool(meta.get("converged", False)),
+        stop_reason=str(meta.get("stop_reason", "read from a file")),
+        seconds=meta.get("seconds", {}),
+    )
+
+
+def _read_meta(path: object, meta: NDArray[Any] | None) -> dict[str, Any]:
+    if meta is None:
+        return {}
+    try:
+        value = json.loads(str(meta))
+    except ValueError as error:
+        raise FileFormatError(f"{path}: meta is not JSON: {error}") from None
+    if not isinstance(value, dict):
+        raise FileFormatError(f"{path}: meta is not a JSON object")
+    return value
+
+
+def _read_record(record: dict[str, Any]) -> IterationRecord:
+    names = [f.name for f in dataclasses.fields(IterationRecord)]
+    return IterationRecord(**{k: NAN if record[k] is None else record[k] for k in names})
+
+
+def elements(mesh: TriMesh | TetMesh) -> NDArray[np.int32]:
+    """``T`` of a tet mesh, ``F`` of a triangle mesh."""
+    return mesh.T if hasattr(mesh, "T") else mesh.F
+
+
+def versions() -> dict[str, str]:
+    """Versions of stretchmap and of what it computes with."""
+    import scipy
+
+    from . import __version__
+
+    return {
+        "stretchmap": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+    }
+
+
+def plain(value: Any) -> Any:
+    """A copy made of what JSON knows: NumPy scalars and arrays converted, non-finite to None."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def table(rows: Mapping[str, Any]) -> str:
+    """Two aligned columns, one row per entry."""
+    width = max((len(name) for name in rows), default=0)
+    return "\n".join(f"{name.replace('_', ' '):<{width}}  {_cell(v)}" for name, v in rows.items())
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return format(value, ".6g") if isinstance(value, float) else str(value)
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary path beside ``path``, renamed to it at the end and removed on failure.
+
+    Parameters
+    ----------
+    path : path-like
+        Where the finished file goes; its suffix is kept.
+    """
+    path = Path(path)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
