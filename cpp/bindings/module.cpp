@@ -2,6 +2,8 @@
 #include "arrays.hpp"
 
 namespace stretchmap::bindings {
+void bind_forms(py::module_& m);
+void bind_homology(py::module_& m);
 void bind_mesh(py::module_& m);
 }  // namespace stretchmap::bindings
 
@@ -20,4 +22,6 @@ PYBIND11_MODULE(_core, m) {
   });
 
   bind_mesh(m);
+  bind_homology(m);
+  bind_forms(m);
 }

@@ -1,0 +1,22 @@
+// Harmonic 1-forms of a weighted surface: (3.3)-(3.5) for many classes at once.
+#pragma once
+
+#include "stretchmap/base/types.hpp"
+#include "stretchmap/mesh/surface_topology.hpp"
+
+namespace stretchmap {
+
+struct HarmonicSolution {
+  Rows forms;       // (k, e) eta + d potential
+  Rows potentials;  // (n, k) column l belongs to form l, zero at vertex 0
+  Rows gram;        // (k, k) sum over edges of weight * form_i * form_j
+};
+
+// Solves sum_j w_ij (eta([i, j]) + h_j - h_i) = 0 for every row of `eta` (k, e): one
+// factorisation of the Laplacian with vertex 0 pinned, k right-hand sides.
+// \pre    connected surface, eta closed, weights (e) with a positive definite pinned Laplacian.
+// \throws Error "SolverError" when the factorisation breaks down.
+HarmonicSolution harmonic_forms(const SurfaceTopology& top, const VecRef& weights,
+                                const RowsRef& eta);
+
+}  // namespace stretchmap

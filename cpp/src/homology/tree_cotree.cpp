@@ -1,0 +1,214 @@
+#include "stretchmap/homology/tree_cotree.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <queue>
+#include <string>
+#include <utility>
+
+#include "stretchmap/base/errors.hpp"
+
+namespace stretchmap {
+namespace {
+
+struct PrimalTree {
+  std::vector<Index> parent;  // half-edge that enters the vertex, -1 at the root
+  std::vector<double> depth;  // distance from the root
+};
+
+PrimalTree shortest_path_tree(const SurfaceTopology& top, const VecRef& length) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  PrimalTree tree{std::vector<Index>(top.n_vertices, -1),
+                  std::vector<double>(top.n_vertices, infinity)};
+  using Entry = std::pair<double, Index>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+  tree.depth[0] = 0.0;
+  queue.emplace(0.0, 0);
+  while (!queue.empty()) {
+    const auto [distance, i] = queue.top();
+    queue.pop();
+    if (distance > tree.depth[i]) continue;
+    const Index first = top.vertex_halfedge[i];
+    Index h = first;
+    do {
+      const Index j = top.head(h);
+      const double candidate = distance + length[top.edge[h]];
+      if (candidate < tree.depth[j]) {
+        tree.depth[j] = candidate;
+        tree.parent[j] = h;
+        queue.emplace(candidate, j);
+      }
+      h = top.twin[SurfaceTopology::prev(h)];
+    } while (h != first);
+  }
+  for (Index i = 0; i < top.n_vertices; ++i) {
+    if (tree.depth[i] == infinity) {
+      throw Error("ConnectivityError",
+                  "vertex " + std::to_string(i) +
+                      " is not joined to vertex 0: the surface has more than one component, or a "
+                      "vertex that no face uses; keep one component",
+                  {i});
+    }
+  }
+  return tree;
+}
+
+Index find_root(std::vector<Index>& leader, Index f) {
+  while (leader[f] != f) f = leader[f] = leader[leader[f]];
+  return f;
+}
+
+// Kruskal on the dual graph, longest closing loop first. Marks the edges that the cotree crosses
+// and returns those that neither tree uses, shortest closing loop first.
+std::vector<Index> grow_cotree(const SurfaceTopology& top, const VecRef& length,
+                               const PrimalTree& tree, std::vector<char>& crossed) {
+  const Index n_edges = static_cast<Index>(top.edges.rows());
+  std::vector<char> in_tree(n_edges, 0);
+  for (const Index h : tree.parent) {
+    if (h >= 0) in_tree[top.edge[h]] = 1;
+  }
+  std::vector<std::pair<double, Index>> order;
+  order.reserve(n_edges - top.n_vertices + 1);
+  for (Index e = 0; e < n_edges; ++e) {
+    if (in_tree[e]) continue;
+    order.emplace_back(tree.depth[top.edges(e, 0)] + tree.depth[top.edges(e, 1)] + length[e], e);
+  }
+  std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first > b.first : a.second < b.second;
+  });
+  std::vector<Index> leader(top.faces.rows());
+  std::iota(leader.begin(), leader.end(), 0);
+  crossed.assign(n_edges, 0);
+  std::vector<Index> left_over;
+  for (const auto& [weight, e] : order) {
+    const Index h = top.edge_halfedge[e];
+    const Index f = find_root(leader, h / 3);
+    const Index g = find_root(leader, top.twin[h] / 3);
+    if (f == g) {
+      left_over.push_back(e);
+    } else {
+      leader[f] = g;
+      crossed[e] = 1;
+    }
+  }
+  std::reverse(left_over.begin(), left_over.end());
+  return left_over;
+}
+
+// For each face the half-edge of that face across which its dual parent lies, -1 at the root.
+std::vector<Index> dual_parents(const SurfaceTopology& top, const std::vector<char>& crossed) {
+  std::vector<Index> parent(top.faces.rows(), -2), queue{0};
+  parent[0] = -1;
+  for (std::size_t at = 0; at < queue.size(); ++at) {
+    for (Index h = 3 * queue[at]; h < 3 * queue[at] + 3; ++h) {
+      const Index other = top.twin[h];
+      if (!crossed[top.edge[h]] || parent[other / 3] != -2) continue;
+      parent[other / 3] = other;
+      queue.push_back(other / 3);
+    }
+  }
+  return parent;
+}
+
+std::vector<Index> path_from_root(const SurfaceTopology& top, const PrimalTree& tree, Index i) {
+  std::vector<Index> path{i};
+  while (tree.parent[i] >= 0) path.push_back(i = top.tail(tree.parent[i]));
+  std::reverse(path.begin(), path.end());
+  return path;
+}
+
+// Tree path to the tail, the half-edge itself, tree path back; the common part dropped.
+Loop close_loop(const SurfaceTopology& top, const PrimalTree& tree, Index h) {
+  const std::vector<Index> there = path_from_root(top, tree, top.tail(h));
+  const std::vector<Index> back = path_from_root(top, tree, top.head(h));
+  std::size_t common = 1;
+  while (common < std::min(there.size(), back.size()) && there[common] == back[common]) ++common;
+  Loop loop(there.begin() + (common - 1), there.end());
+  loop.insert(loop.end(), back.rbegin(), back.rend() - common);
+  return loop;
+}
+
+}  // namespace
+
+HomologyGenerators tree_cotree(const SurfaceTopology& top, const VecRef& edge_length) {
+  const PrimalTree tree = shortest_path_tree(top, edge_length);
+  std::vector<char> crossed;
+  const std::vector<Index> left_over = grow_cotree(top, edge_length, tree, crossed);
+  const std::vector<Index> parent = dual_parents(top, crossed);
+
+  HomologyGenerators result;
+  result.forms.setZero(left_over.size(), top.edges.rows());
+  for (std::size_t i = 0; i < left_over.size(); ++i) {
+    const Index h = top.edge_halfedge[left_over[i]];
+    result.loops.push_back(close_loop(top, tree, h));
+    // The dual loop crosses h from left to right and returns through the cotree. A half-edge
+    // crossed from left to right counts +1; the parts common to both tree paths cancel.
+    auto form = result.forms.row(i);
+    const auto cross = [&](Index k, Index sign) {
+      form[top.edge[k]] += top.sign(k) > 0 ? sign : -sign;
+    };
+    cross(h, 1);
+    for (Index f = top.twin[h] / 3; parent[f] >= 0; f = top.twin[parent[f]] / 3) {
+      cross(parent[f], 1);
+    }
+    for (Index f = h / 3; parent[f] >= 0; f = top.twin[parent[f]] / 3) cross(parent[f], -1);
+  }
+  return result;
+}
+
+Vec edge_lengths(const SurfaceTopology& top, const PointsRef& points) {
+  Vec length(top.edges.rows());
+  for (Index e = 0; e < length.size(); ++e) {
+    length[e] = (points.row(top.edges(e, 1)) - points.row(top.edges(e, 0))).norm();
+  }
+  return length;
+}
+
+Index find_halfedge(const SurfaceTopology& top, Index i, Index j) {
+  const Index first = top.vertex_halfedge[i];
+  Index h = first;
+  do {
+    if (top.head(h) == j) return h;
+    h = top.twin[SurfaceTopology::prev(h)];
+  } while (h != first);
+  return -1;
+}
+
+std::vector<Index> loop_halfedges(const SurfaceTopology& top, const Loop& loop) {
+  std::vector<Index> path(loop.size());
+  for (std::size_t k = 0; k < loop.size(); ++k) {
+    const Index next = loop[(k + 1) % loop.size()];
+    path[k] = find_halfedge(top, loop[k], next);
+    if (path[k] < 0) {
+      throw Error("ArrayError",
+                  "no edge joins the consecutive loop vertices " + std::to_string(loop[k]) +
+                      " and " + std::to_string(next),
+                  {loop[k], next});
+    }
+  }
+  return path;
+}
+
+IndexVec periods(const SurfaceTopology& top, const Eigen::Ref<const IndexRows>& forms,
+                 const Loop& loop) {
+  IndexVec sum = IndexVec::Zero(forms.rows());
+  for (const Index h : loop_halfedges(top, loop)) {
+    sum += forms.col(top.edge[h]) * (top.sign(h) > 0 ? 1 : -1);
+  }
+  return sum;
+}
+
+Rows wedge_matrix(const SurfaceTopology& top, const RowsRef& forms) {
+  const Index k = static_cast<Index>(forms.rows());
+  Rows wedge = Rows::Zero(k, k);
+  for (Index f = 0; f < top.faces.rows(); ++f) {
+    const Index h = 3 * f;
+    const Vec first = forms.col(top.edge[h]) * (0.5 * top.sign(h));
+    const Vec second = forms.col(top.edge[h + 1]) * top.sign(h + 1);
+    wedge += first * second.transpose() - second * first.transpose();
+  }
+  return wedge;
+}
+
+}  // namespace stretchmap
