@@ -97,6 +97,20 @@ std::vector<Index> left_crossings(const SurfaceTopology& top, const Loop& loop) 
   return crossings;
 }
 
+// Dihedral angle outside the surface at the edge of half-edge h, over 2 pi: one half where flat.
+double exterior_turns(const SurfaceTopology& top, const PointsRef& points, Index h) {
+  const auto normal = [&](Index f) -> Eigen::Vector3d {
+    const Eigen::Vector3d x = points.row(top.faces(f, 0));
+    const Eigen::Vector3d y = points.row(top.faces(f, 1));
+    const Eigen::Vector3d z = points.row(top.faces(f, 2));
+    return (y - x).cross(z - x);
+  };
+  const Eigen::Vector3d left = normal(h / 3), right = normal(top.twin[h] / 3);
+  const Eigen::Vector3d along = (points.row(top.head(h)) - points.row(top.tail(h))).normalized();
+  const double bend = std::atan2(along.dot(left.cross(right)), left.dot(right));
+  return 0.5 + bend / (2.0 * kPi);
+}
+
 }  // namespace
 
 double gauss_linking(const PointsRef& p, const PointsRef& q) {
@@ -125,15 +139,16 @@ Rows linking_matrix(const SurfaceTopology& top, const PointsRef& points,
         polygon.row(k) = points.row(top.tail(along[k]));
         direction[top.edge[along[k]]] = top.sign(along[k]) > 0 ? 1 : -1;
       }
-      Index crossed = 0;
+      double lifted = 0.0;
       for (const Index h : crossings) {
-        crossed += direction[top.edge[h]] * (top.sign(h) > 0 ? 1 : -1);
+        const Index run = direction[top.edge[h]];
+        if (run != 0) lifted += run * top.sign(h) * exterior_turns(top, points, h);
       }
       const double integral = gauss_integral(polygon, midpoints, [&](Index s, Index t) {
         const Index e = top.edge[along[s]];
         return e == top.edge[crossings[t]] || e == top.edge[crossings[(t + 1) % nq]];
       });
-      matrix(i, j) = integral + 0.5 * crossed;
+      matrix(i, j) = integral + lifted;
       if (!(std::abs(matrix(i, j) - std::round(matrix(i, j))) < 1e-6)) {
         throw Error("SolverError",
                     "the linking number of loops " + std::to_string(i) + " and " +

@@ -1,0 +1,68 @@
+"""Exact integer linear algebra for matrices of a few rows, in Python integers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["complement", "integer_inverse", "integer_kernel"]
+
+
+def integer_kernel(matrix: ArrayLike) -> NDArray[np.int64]:
+    """Basis of the integer vectors that a matrix sends to zero.
+
+    Parameters
+    ----------
+    matrix : (k, n) array_like of integers
+
+    Returns
+    -------
+    (d, n) ndarray of int64
+        Rows generate ``{x in Z^n : matrix x = 0}``; the lattice they span has no gaps.
+    """
+    matrix = np.asarray(matrix)
+    n = matrix.shape[1]
+    # Columns of [matrix; identity], reduced by unimodular column operations.
+    columns = [[int(x) for x in matrix[:, j]] + _unit(n, j) for j in range(n)]
+    free = columns
+    for row in range(matrix.shape[0]):
+        while True:
+            active = [c for c in free if c[row]]
+            if len(active) < 2:
+                break
+            pivot = min(active, key=lambda c: abs(c[row]))
+            for c in active:
+                if c is not pivot:
+                    factor = c[row] // pivot[row]
+                    c[:] = [x - factor * y for x, y in zip(c, pivot, strict=True)]
+        free = [c for c in free if not c[row]]
+    basis = [c[matrix.shape[0] :] for c in free]
+    return np.array(basis, dtype=np.int64).reshape(len(basis), n)
+
+
+def complement(vector: ArrayLike) -> NDArray[np.int64]:
+    """For a primitive ``(p, q)`` a pair ``(s, t)`` with ``s q - p t = 1``."""
+    p, q = (int(x) for x in np.asarray(vector))
+    # Extended Euclid on (|q|, |p|): s |q| + t |p| = 1.
+    r0, r1, s0, s1, t0, t1 = abs(q), abs(p), 1, 0, 0, 1
+    while r1:
+        factor = r0 // r1
+        r0, r1 = r1, r0 - factor * r1
+        s0, s1 = s1, s0 - factor * s1
+        t0, t1 = t1, t0 - factor * t1
+    if r0 != 1:
+        raise ValueError(f"({p}, {q}) is not primitive")
+    return np.array([s0 if q >= 0 else -s0, -t0 if p >= 0 else t0], dtype=np.int64)
+
+
+def integer_inverse(matrix: ArrayLike) -> NDArray[np.int64]:
+    """Inverse of a small integer matrix of determinant plus or minus one."""
+    matrix = np.asarray(matrix, dtype=np.int64)
+    inverse = np.rint(np.linalg.inv(matrix)).astype(np.int64)
+    if not np.array_equal(matrix @ inverse, np.eye(len(matrix), dtype=np.int64)):
+        raise ValueError("the matrix has no integer inverse")
+    return inverse
+
+
+def _unit(n: int, j: int) -> list[int]:
+    return [int(i == j) for i in range(n)]
