@@ -1,4 +1,5 @@
 #include "arrays.hpp"
+#include "stretchmap/mesh/diagnosis.hpp"
 #include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/orient.hpp"
 #include "stretchmap/mesh/size.hpp"
@@ -55,11 +56,50 @@ void bind_sizes(py::module_& m) {
   m.def("misoriented_tets", &misoriented_tets, points, tets, release_gil());
 }
 
+void bind_diagnosis(py::module_& m) {
+  py::class_<SurfaceDiagnosis>(m, "SurfaceDiagnosis")
+      .def(py::init(&diagnose_surface), py::arg("points").noconvert(), py::arg("faces").noconvert(),
+           release_gil())
+      .def_readonly("repeated", &SurfaceDiagnosis::repeated)
+      .def_readonly("duplicates", &SurfaceDiagnosis::duplicates)
+      .def_readonly("degenerate", &SurfaceDiagnosis::degenerate)
+      .def_readonly("misoriented", &SurfaceDiagnosis::misoriented)
+      .def_readonly("conflicts", &SurfaceDiagnosis::conflicts)
+      .def_readonly("inside_out", &SurfaceDiagnosis::inside_out)
+      .def_readonly("nonmanifold_edges", &SurfaceDiagnosis::nonmanifold_edges)
+      .def_readonly("border_edges", &SurfaceDiagnosis::border_edges)
+      .def_readonly("nonmanifold_vertices", &SurfaceDiagnosis::nonmanifold_vertices)
+      .def_readonly("unreferenced", &SurfaceDiagnosis::unreferenced)
+      .def_readonly("component", &SurfaceDiagnosis::component)
+      .def_readonly("euler", &SurfaceDiagnosis::euler)
+      .def_readonly("genus", &SurfaceDiagnosis::genus);
+
+  py::class_<SolidDiagnosis>(m, "SolidDiagnosis")
+      .def(py::init(&diagnose_solid), py::arg("points").noconvert(), py::arg("tets").noconvert(),
+           release_gil())
+      .def_readonly("repeated", &SolidDiagnosis::repeated)
+      .def_readonly("duplicates", &SolidDiagnosis::duplicates)
+      .def_readonly("degenerate", &SolidDiagnosis::degenerate)
+      .def_readonly("misoriented", &SolidDiagnosis::misoriented)
+      .def_readonly("inverted", &SolidDiagnosis::inverted)
+      .def_readonly("conflicts", &SolidDiagnosis::conflicts)
+      .def_readonly("nonmanifold_faces", &SolidDiagnosis::nonmanifold_faces)
+      .def_readonly("nonmanifold_edges", &SolidDiagnosis::nonmanifold_edges)
+      .def_readonly("nonmanifold_vertices", &SolidDiagnosis::nonmanifold_vertices)
+      .def_readonly("unreferenced", &SolidDiagnosis::unreferenced)
+      .def_readonly("component", &SolidDiagnosis::component)
+      .def_readonly("euler", &SolidDiagnosis::euler)
+      .def_readonly("boundary_faces", &SolidDiagnosis::boundary_faces)
+      .def_readonly("boundary_component", &SolidDiagnosis::boundary_component)
+      .def_readonly("boundary_genus", &SolidDiagnosis::boundary_genus);
+}
+
 }  // namespace
 
 void bind_mesh(py::module_& m) {
   bind_topology(m);
   bind_sizes(m);
+  bind_diagnosis(m);
 }
 
 }  // namespace stretchmap::bindings

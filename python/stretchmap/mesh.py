@@ -15,8 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._arrays import as_indices, as_points, read_only
+from .diagnosis import Diagnosis, diagnose_solid, diagnose_surface
 
 __all__ = ["TetMesh", "TriMesh"]
+
+# Defects that leave a surface without a genus.
+_NO_GENUS = ("nonmanifold_edges", "nonmanifold_vertices", "border_edges", "not_orientable")
 
 
 class _Mesh:
@@ -137,6 +141,82 @@ class TriMesh(_Mesh):
         """Signed enclosed volume, positive with outward normals; meaningless with a border."""
         return float(_core.enclosed_volume(self.V, self.F))
 
+    @property
+    def n_components(self) -> int:
+        """Number of components (faces that share a vertex belong together)."""
+        return self._diagnosis.n_components
+
+    @property
+    def euler(self) -> int:
+        """Euler characteristic, vertices no face uses not counted."""
+        return int(self._diagnosis.euler.sum())
+
+    @property
+    def genus(self) -> int:
+        """Genus, summed over the components.
+
+        Raises
+        ------
+        MeshError
+            The surface is not closed, manifold and orientable; the defect at fault.
+        """
+        diagnosis = self._diagnosis
+        if (diagnosis.genus < 0).any():
+            diagnosis.require(_NO_GENUS)
+        return int(diagnosis.genus.sum())
+
+    @cached_property
+    def _diagnosis(self) -> Diagnosis:
+        return diagnose_surface(self.V, self.F)
+
+    def diagnose(self) -> Diagnosis:
+        """List every defect with its ids.
+
+        Returns
+        -------
+        Diagnosis
+        """
+        return self._diagnosis
+
+    def require_closed(self) -> None:
+        """Raise unless this is one closed, manifold, outward oriented surface without defects.
+
+        Any genus will do.
+
+        Raises
+        ------
+        DegenerateError
+            Repeated vertices, copies, faces without area, unreferenced vertices.
+        NonManifoldError, OpenSurfaceError, OrientationError, ConnectivityError
+            As named; exactly one is raised, with the ids and the remedy.
+        """
+        self._diagnosis.require()
+
+    def require_genus_one(self) -> None:
+        """Raise unless this is a torus without defects.
+
+        Raises
+        ------
+        MeshError
+            As `require_closed`.
+        GenusError
+            Another genus.
+        """
+        self._diagnosis.require()
+        self._diagnosis.require_torus()
+
+    def compact(self) -> tuple[TriMesh, NDArray[np.int32]]:
+        """Drop the vertices no face uses.
+
+        Returns
+        -------
+        mesh : TriMesh
+        kept : (n_kept,) ndarray of int32
+            Vertex of the result -> vertex of this mesh, ascending.
+        """
+        kept, faces = _compacted(self.F)
+        return TriMesh(self.V[kept], faces), kept
+
 
 class TetMesh(_Mesh):
     """A tetrahedral mesh.
@@ -241,6 +321,56 @@ class TetMesh(_Mesh):
     def volume(self) -> float:
         """Sum of the signed volumes."""
         return float(self.tet_volumes.sum())
+
+    @cached_property
+    def _diagnosis(self) -> Diagnosis:
+        return diagnose_solid(self.V, self.T)
+
+    def diagnose(self) -> Diagnosis:
+        """List every defect with its ids.
+
+        Returns
+        -------
+        Diagnosis
+        """
+        return self._diagnosis
+
+    def require_solid_torus(self) -> None:
+        """Raise unless this is a solid torus without defects.
+
+        Raises
+        ------
+        DegenerateError
+            Repeated vertices, copies, tets without volume, unreferenced vertices.
+        NonManifoldError, OrientationError, ConnectivityError
+            As named; exactly one is raised, with the ids and the remedy.
+        GenusError
+            The boundary is not one torus, or the Euler characteristic is not zero.
+
+        Notes
+        -----
+        What is checked is the homology of a solid torus. A ball with a knotted tunnel has the same
+        and is not told apart; nor are tets that overlap without a negative one among them.
+        """
+        self._diagnosis.require()
+        self._diagnosis.require_torus()
+
+    def compact(self) -> tuple[TetMesh, NDArray[np.int32]]:
+        """Drop the vertices no tet uses.
+
+        Returns
+        -------
+        mesh : TetMesh
+        kept : (n_kept,) ndarray of int32
+            Vertex of the result -> vertex of this mesh, ascending.
+        """
+        kept, tets = _compacted(self.T)
+        return TetMesh(self.V[kept], tets), kept
+
+
+def _compacted(elements: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    kept, inverse = np.unique(elements, return_inverse=True)
+    return read_only(kept), inverse.reshape(elements.shape)
 
 
 def _turned(elements: NDArray[np.int32], ids: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -1,0 +1,59 @@
+// Union-find whose roots are the lowest members, so results do not depend on the order of unions.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap {
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(Index n) : parent_(n) {
+    for (Index i = 0; i < n; ++i) parent_[i] = i;
+  }
+  Index find(Index i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void unite(Index a, Index b) {
+    a = find(a);
+    b = find(b);
+    if (b < a) std::swap(a, b);
+    parent_[b] = a;
+  }
+
+ private:
+  std::vector<Index> parent_;
+};
+
+// Connected components of elements (rows of vertex ids): two that share a vertex belong together.
+struct Components {
+  Index count = 0;
+  IndexVec element;  // (m) component of each element, numbered by lowest element; -1 where skipped
+  IndexVec vertex;   // (n) component of each vertex, -1 where no element uses it
+};
+
+template <class Elements>
+Components components(const Elements& elements, Index n_vertices, const std::vector<char>& skip) {
+  DisjointSets sets(n_vertices);
+  for (Index e = 0; e < elements.rows(); ++e) {
+    if (!skip.empty() && skip[e]) continue;
+    for (Index k = 1; k < elements.cols(); ++k) sets.unite(elements(e, 0), elements(e, k));
+  }
+  Components result;
+  IndexVec number = IndexVec::Constant(n_vertices, -1);
+  result.element.setConstant(elements.rows(), -1);
+  result.vertex.setConstant(n_vertices, -1);
+  for (Index e = 0; e < elements.rows(); ++e) {
+    if (!skip.empty() && skip[e]) continue;
+    Index& component = number[sets.find(elements(e, 0))];
+    if (component < 0) component = result.count++;
+    result.element[e] = component;
+    for (Index k = 0; k < elements.cols(); ++k) result.vertex[elements(e, k)] = component;
+  }
+  return result;
+}
+
+}  // namespace stretchmap

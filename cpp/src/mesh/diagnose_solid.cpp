@@ -1,0 +1,140 @@
+#include "diagnosis_common.hpp"
+#include "stretchmap/mesh/diagnosis.hpp"
+#include "stretchmap/mesh/size.hpp"
+
+namespace stretchmap {
+namespace {
+
+using Triple = Eigen::Matrix<Index, 1, 3>;
+
+void orientation(const PointsRef& points, const TetsRef& tets, const FacetGroups& faces,
+                 const Mask& skip, SolidDiagnosis& report) {
+  const Patches patches = tet_patches(tets, faces, skip);
+  const Mask turn = tets_to_turn(points, tets, patches);
+  const Vec volumes = tet_volumes(points, tets);
+  const auto flat = degenerate_tets(points, tets);
+  Mask no_volume(tets.rows(), 0), folded(tets.rows(), 0);
+  for (Index t = 0; t < tets.rows(); ++t) {
+    if (skip[t]) continue;
+    no_volume[t] = flat[t];
+    folded[t] = !flat[t] && (turn[t] ? volumes[t] > 0 : volumes[t] < 0);
+  }
+  report.degenerate = set_entries(no_volume);
+  report.inverted = set_entries(folded);
+  report.misoriented = set_entries(turn);
+  report.conflicts = detail::as_vector(patches.conflicts);
+}
+
+void boundary(const PointsRef& points, const TetsRef& tets, const FacetGroups& faces,
+              SolidDiagnosis& report) {
+  std::vector<Triple> crowded;
+  std::vector<Index> single;
+  for (Index g = 0; g < faces.size(); ++g) {
+    const Index h = faces.order[faces.start[g]];
+    const Index members = faces.start[g + 1] - faces.start[g];
+    if (members == 1) single.push_back(h);
+    if (members > 2) crowded.push_back(half_face(tets, h));
+  }
+  std::sort(single.begin(), single.end());
+  report.nonmanifold_faces = detail::as_rows<Faces>(crowded);
+  report.boundary_faces.resize(static_cast<Index>(single.size()), 3);
+  for (std::size_t f = 0; f < single.size(); ++f) {
+    report.boundary_faces.row(f) = half_face(tets, single[f]);
+  }
+  const SurfaceDiagnosis surface = diagnose_surface(points, report.boundary_faces);
+  report.boundary_component = surface.component;
+  report.boundary_genus = surface.genus;
+  report.nonmanifold_edges = surface.nonmanifold_edges;
+  report.nonmanifold_vertices = surface.nonmanifold_vertices;
+}
+
+// A vertex is sound when the triangles opposite to it in its tets form a sphere or a disk. They
+// form a connected surface, perhaps pinched, whose Euler characteristic is 2 (inside) or 1 (on the
+// boundary) in just those cases, because handles and pinches only lower it.
+void vertex_links(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& edges,
+                  const Mask& skip, Index n_vertices, SolidDiagnosis& report) {
+  DisjointSets corners(static_cast<Index>(4 * tets.rows()));
+  IndexVec euler = IndexVec::Zero(n_vertices);
+  IndexVec expected = IndexVec::Constant(n_vertices, 2);
+  const auto corner_of = [&](Index t, Index v) {
+    for (Index k = 0; k < 3; ++k) {
+      if (tets(t, k) == v) return 4 * t + k;
+    }
+    return 4 * t + 3;
+  };
+  for (Index g = 0; g < faces.size(); ++g) {
+    const Index first = faces.start[g], last = faces.start[g + 1];
+    const Index h = faces.order[first];
+    for (const Index v : half_face(tets, h)) {
+      --euler[v];
+      if (last - first == 1) expected[v] = 1;
+      for (Index p = first + 1; p < last; ++p) {
+        corners.unite(corner_of(h / 4, v), corner_of(faces.order[p] / 4, v));
+      }
+    }
+  }
+  for (Index t = 0; t < tets.rows(); ++t) {
+    if (skip[t]) continue;
+    for (int k = 0; k < 4; ++k) ++euler[tets(t, k)];
+  }
+  for (Index g = 0; g < edges.size(); ++g) {
+    const Index h = edges.order[edges.start[g]];
+    for (const int k : kTetEdge[h % 6]) ++euler[tets(h / 6, k)];
+  }
+  Mask unsound(n_vertices, 0), used(n_vertices, 0);
+  detail::mark_split_corners(tets, skip, corners, unsound);
+  for (Index t = 0; t < tets.rows(); ++t) {
+    for (int k = 0; k < 4 && !skip[t]; ++k) used[tets(t, k)] = 1;
+  }
+  for (Index i = 0; i < n_vertices; ++i) unsound[i] |= used[i] && euler[i] != expected[i];
+  for (const Index i : report.nonmanifold_vertices) unsound[i] = 1;
+  for (const Index i : report.nonmanifold_edges.reshaped()) unsound[i] = 0;
+  for (const Index i : report.nonmanifold_faces.reshaped()) unsound[i] = 0;
+  report.nonmanifold_vertices = set_entries(unsound);
+}
+
+void topology(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& edges,
+              const Mask& skip, Index n_vertices, SolidDiagnosis& report) {
+  const Components parts = components(tets, n_vertices, skip);
+  report.component = parts.element;
+  report.unreferenced = detail::negative_entries(parts.vertex);
+  report.euler.setZero(parts.count);
+  for (Index i = 0; i < n_vertices; ++i) {
+    if (parts.vertex[i] >= 0) ++report.euler[parts.vertex[i]];
+  }
+  for (Index g = 0; g < edges.size(); ++g) {
+    --report.euler[parts.element[edges.order[edges.start[g]] / 6]];
+  }
+  for (Index g = 0; g < faces.size(); ++g) {
+    ++report.euler[parts.element[faces.order[faces.start[g]] / 4]];
+  }
+  for (Index t = 0; t < tets.rows(); ++t) {
+    if (parts.element[t] >= 0) --report.euler[parts.element[t]];
+  }
+}
+
+}  // namespace
+
+SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets) {
+  const Index n_vertices = static_cast<Index>(points.rows());
+  SolidDiagnosis report;
+  Mask skip = detail::repeating(tets);
+  report.repeated = set_entries(skip);
+  Mask copies =
+      detail::later_members(group_equal_tets(tets, n_vertices), static_cast<Index>(tets.rows()));
+  for (std::size_t t = 0; t < skip.size(); ++t) {
+    if (skip[t]) copies[t] = 0;
+    skip[t] |= copies[t];
+  }
+  report.duplicates = set_entries(copies);
+
+  const FacetGroups faces = group_half_faces(tets, n_vertices, skip);
+  const FacetGroups edges = group_tet_edges(tets, n_vertices, skip);
+  orientation(points, tets, faces, skip, report);
+  boundary(points, tets, faces, report);
+  vertex_links(tets, faces, edges, skip, n_vertices, report);
+  topology(tets, faces, edges, skip, n_vertices, report);
+  return report;
+}
+
+}  // namespace stretchmap
