@@ -1,0 +1,43 @@
+// Loops over rows in fixed chunks: what a chunk computes, and the order in which partial sums are
+// added, do not depend on the number of threads.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::linalg {
+
+inline constexpr Index kChunk = 2048;  // rows per chunk
+
+inline Index chunk_count(Index n) { return (n + kChunk - 1) / kChunk; }
+
+// body(begin, end) for every chunk of [0, n).
+template <class Body>
+void for_chunks(Index n, const Body& body) {
+  const Index chunks = chunk_count(n);
+#pragma omp parallel for schedule(static) if (chunks > 1)
+  for (Index c = 0; c < chunks; ++c) body(c * kChunk, std::min(n, (c + 1) * kChunk));
+}
+
+// body(begin, end, sums) adds to sums[0 .. K-1]; the chunks' sums are added in order.
+template <int K, class Body>
+std::array<double, K> sum_chunks(Index n, const Body& body) {
+  const Index chunks = chunk_count(n);
+  std::vector<std::array<double, K>> partial(static_cast<std::size_t>(chunks));
+#pragma omp parallel for schedule(static) if (chunks > 1)
+  for (Index c = 0; c < chunks; ++c) {
+    std::array<double, K> sums{};
+    body(c * kChunk, std::min(n, (c + 1) * kChunk), sums);
+    partial[static_cast<std::size_t>(c)] = sums;
+  }
+  std::array<double, K> total{};
+  for (const auto& sums : partial)
+    for (int k = 0; k < K; ++k) total[k] += sums[k];
+  return total;
+}
+
+}  // namespace stretchmap::linalg
