@@ -6,6 +6,7 @@ void bind_forms(py::module_& m);
 void bind_homology(py::module_& m);
 void bind_mesh(py::module_& m);
 void bind_linalg(py::module_& m);
+void bind_distortion(py::module_& m);
 }  // namespace stretchmap::bindings
 
 PYBIND11_MODULE(_core, m) {
@@ -26,4 +27,5 @@ PYBIND11_MODULE(_core, m) {
   bind_homology(m);
   bind_forms(m);
   bind_linalg(m);
+  bind_distortion(m);
 }
