@@ -5,6 +5,7 @@ namespace stretchmap::bindings {
 void bind_forms(py::module_& m);
 void bind_homology(py::module_& m);
 void bind_mesh(py::module_& m);
+void bind_volume(py::module_& m);
 void bind_linalg(py::module_& m);
 void bind_distortion(py::module_& m);
 }  // namespace stretchmap::bindings
@@ -24,6 +25,7 @@ PYBIND11_MODULE(_core, m) {
   });
 
   bind_mesh(m);
+  bind_volume(m);
   bind_homology(m);
   bind_forms(m);
   bind_linalg(m);

@@ -1,0 +1,121 @@
+#include "arrays.hpp"
+#include "stretchmap/stretch/rest_shape.hpp"
+#include "stretchmap/stretch/solid_newton.hpp"
+#include "stretchmap/stretch/tet_laplacian.hpp"
+#include "stretchmap/stretch/volumetric_stretch.hpp"
+
+namespace stretchmap::bindings {
+
+namespace {
+
+SolveOptions solve_options(double tol, int max_iter) {
+  SolveOptions options;
+  options.tol = tol;
+  options.max_iter = max_iter;
+  return options;
+}
+
+}  // namespace
+
+void bind_volume(py::module_& m) {
+  py::class_<VolumetricStretch>(m, "VolumetricStretch")
+      .def(py::init<const TetsRef&, const FlagsRef&, const VecRef&, std::string>(),
+           py::arg("tets").noconvert(), py::arg("fixed").noconvert(),
+           py::arg("rest_volumes").noconvert(), py::arg("backend") = "auto", release_gil())
+      .def_property_readonly("backend", &VolumetricStretch::backend)
+      .def(
+          "harmonic",
+          [](VolumetricStretch& self, const PointsRef& source, Points x, double tol, int max_iter) {
+            const auto report =
+                self.harmonic(source, x, solve_options(tol, max_iter), signal_poll());
+            return std::make_pair(std::move(x), report);
+          },
+          py::arg("source").noconvert(), py::arg("x"), py::arg("tol") = 1e-10,
+          py::arg("max_iter") = 1000, release_gil())
+      .def(
+          "step",
+          [](VolumetricStretch& self, Points x, double c, double tol, int max_iter) {
+            const auto report = self.step(x, c, solve_options(tol, max_iter), signal_poll());
+            return std::make_pair(std::move(x), report);
+          },
+          py::arg("x"), py::arg("c"), py::arg("tol") = 1e-10, py::arg("max_iter") = 1000,
+          release_gil());
+  m.def(
+      "tet_laplacian",
+      [](const TetsRef& tets, const FlagsRef& fixed, const PointsRef& geometry, const VecRef& coef,
+         const PointsRef& x) {
+        TetLaplacian laplacian(tets, fixed);
+        SparseMatrix matrix = laplacian.pattern();
+        Points rhs;
+        laplacian.assemble(geometry, coef, x, matrix, rhs);
+        return std::make_pair(std::move(matrix), std::move(rhs));
+      },
+      py::arg("tets").noconvert(), py::arg("fixed").noconvert(), py::arg("geometry").noconvert(),
+      py::arg("coef"), py::arg("x").noconvert(), "L_II and -L_IB x_B as one pair, for checks.");
+  py::class_<EnergyWeights>(m, "EnergyWeights")
+      .def(py::init([](double shape, double volume, double epsilon) {
+             return EnergyWeights{shape, volume, epsilon};
+           }),
+           py::arg("shape"), py::arg("volume"), py::arg("epsilon") = 0.0)
+      .def_readonly("shape", &EnergyWeights::shape)
+      .def_readonly("volume", &EnergyWeights::volume)
+      .def_readonly("epsilon", &EnergyWeights::epsilon);
+  py::class_<EnergyReport>(m, "EnergyReport")
+      .def_readonly("energy", &EnergyReport::energy)
+      .def_readonly("min_det", &EnergyReport::min_det)
+      .def_readonly("flips", &EnergyReport::flips);
+  py::class_<NewtonReport>(m, "NewtonReport")
+      .def_readonly("before", &NewtonReport::before)
+      .def_readonly("after", &NewtonReport::after)
+      .def_readonly("decrement", &NewtonReport::decrement)
+      .def_readonly("gradient_norm", &NewtonReport::gradient_norm)
+      .def_readonly("alpha", &NewtonReport::alpha)
+      .def_readonly("cg_iterations", &NewtonReport::cg_iterations)
+      .def_readonly("cg_residual", &NewtonReport::cg_residual);
+
+  py::class_<SolidNewton>(m, "SolidNewton")
+      .def(py::init([](const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
+                       const FlagsRef& motion, double R, double r, const PointsRef& x) {
+             return SolidNewton(SolidEnergy(tets, rest, weights, motion, R, r, x));
+           }),
+           py::arg("tets").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
+           py::arg("motion").noconvert(), py::arg("R"), py::arg("r"), py::arg("x").noconvert(),
+           release_gil())
+      .def(
+          "value",
+          [](const SolidNewton& self, const PointsRef& x, const EnergyWeights& w) {
+            return self.energy().value(x, w);
+          },
+          py::arg("x").noconvert(), py::arg("weights"), release_gil())
+      .def(
+          "step",
+          [](SolidNewton& self, Points x, const EnergyWeights& w, double tol, int max_cg) {
+            NewtonOptions options;
+            options.tol = tol;
+            options.max_cg = max_cg;
+            const NewtonReport report = self.step(x, w, options, signal_poll());
+            return std::make_pair(std::move(x), report);
+          },
+          py::arg("x"), py::arg("weights"), py::arg("tol") = 1e-2, py::arg("max_cg") = 300,
+          release_gil());
+
+  m.def(
+      "element_energy",
+      [](const Eigen::Matrix3d& J, const EnergyWeights& w) {
+        Eigen::Matrix3d P;
+        Matrix9 H;
+        const double value = element_energy(J, w, P, &H);
+        return std::make_tuple(value, P, H);
+      },
+      py::arg("J"), py::arg("weights"), "Energy, gradient and projected Hessian of one tet.");
+  m.def("rest_matrices", &rest_matrices, py::arg("V").noconvert(), py::arg("tets").noconvert(),
+        py::arg("max_aspect"), release_gil());
+  m.def("signed_tet_volumes", &signed_tet_volumes, py::arg("x").noconvert(),
+        py::arg("tets").noconvert(), release_gil());
+  m.def("tet_stretch_energy", &tet_stretch_energy, py::arg("image_volumes"),
+        py::arg("rest_volumes"), release_gil());
+  m.def("tet_stretch_gradient", &tet_stretch_gradient, py::arg("image").noconvert(),
+        py::arg("tets").noconvert(), py::arg("rest_volumes"), release_gil());
+}
+
+}  // namespace stretchmap::bindings

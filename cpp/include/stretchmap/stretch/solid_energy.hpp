@@ -1,0 +1,77 @@
+// The distortion energy of a whole solid map, its gradient and its positive semi-definite Hessian.
+//
+//   Psi(x) = sum_t weight_t psi(J_t),   J_t = [x1 - x0, x2 - x0, x3 - x0] * rest_t
+//
+// with psi of element_energy.hpp. Each vertex is free, fixed, or glides on the torus. A gliding
+// vertex has two unknowns, arc length along the two coordinate circles through it; its block is
+// written in the frame (e_u, e_v, normal) with the third unknown absent (identity row).
+//
+// Every block row is summed by one thread over its tets in a fixed order: same bits for any number
+// of threads. Rows are numbered along a space-filling curve.
+#pragma once
+
+#include <vector>
+
+#include "stretchmap/linalg/block_solver.hpp"
+#include "stretchmap/stretch/element_energy.hpp"
+#include "stretchmap/stretch/tet_laplacian.hpp"
+
+namespace stretchmap {
+
+enum Motion : std::uint8_t { kFree = 0, kFixed = 1, kGliding = 2 };
+
+struct EnergyReport {
+  double energy = 0.0;  // +infinity if some tet is inverted and epsilon = 0
+  double min_det = 0.0;
+  Index flips = 0;  // tets with det J <= 0
+};
+
+class SolidEnergy {
+ public:
+  // tets (k, 4), rest (k, 9) row-major 3x3 matrices, weights (k) > 0, motion (n) of Motion values,
+  // R and r the radii of the torus (only used by gliding vertices), x (n, 3) to number rows by.
+  SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
+              const FlagsRef& motion, double R, double r, const PointsRef& x);
+
+  Index rows() const { return static_cast<Index>(row_vertex_.size()); }
+  BlockMatrix pattern() const;  // of the Hessian, values zero
+
+  EnergyReport value(const PointsRef& x, const EnergyWeights& w) const;
+
+  // Gradient (rows, 3) and Hessian, both in vertex frames.
+  // \pre value(x, w).energy is finite.
+  void linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+                 BlockMatrix& hessian);
+
+  // x moved by alpha * step (rows, 3); gliding vertices stay on the torus.
+  Points move(const PointsRef& x, const PointsRef& step, double alpha) const;
+
+  // Largest alpha <= 1 for which no tet that is positive at x turns over along the straight line
+  // of the step, times 0.9.
+  double longest_step(const PointsRef& x, const PointsRef& step) const;
+
+  // Three translations as seen from the vertex frames, (3 rows, 3).
+  Rows near_nullspace(const PointsRef& x) const;
+
+ private:
+  Eigen::Matrix3d frame(const PointsRef& x, Index vertex) const;
+  Eigen::Matrix3d jacobian(const PointsRef& x, Index t) const;
+  void build_pattern();
+  void add_element(const PointsRef& x, const EnergyWeights& w, Index t, Index first, Index last,
+                   Points& gradient, double* blocks) const;
+  void into_frames(const PointsRef& x, Index row, Points& gradient, double* blocks) const;
+
+  Tets tets_;  // sorted by lowest row
+  Rows rest_;
+  Vec weights_;
+  Flags motion_;
+  double R_, r_;
+  IndexVec row_vertex_;          // vertex of each row
+  IndexVec vertex_row_;          // row of each vertex, -1 if fixed
+  IndexVec row_ptr_, col_;       // block pattern
+  IndexRows slot_;               // (k, 16) block of each pair of a tet's vertices, -1 if none
+  std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
+  std::vector<std::vector<Index>> part_tets_;  // tets that touch them, ascending
+};
+
+}  // namespace stretchmap

@@ -1,0 +1,43 @@
+// Projected Newton steps on the energy of a solid map.
+#pragma once
+
+#include <memory>
+
+#include "stretchmap/stretch/solid_energy.hpp"
+
+namespace stretchmap {
+
+struct NewtonOptions {
+  double tol = 1e-2;     // relative residual asked of the conjugate gradients
+  int max_cg = 300;      // more are not spent on one step
+  double armijo = 1e-4;  // demanded share of the predicted decrease
+  int max_halvings = 20;
+};
+
+struct NewtonReport {
+  EnergyReport before, after;
+  double decrement = 0.0;  // -gradient . step, twice the decrease a quadratic model predicts
+  double gradient_norm = 0.0;
+  double alpha = 0.0;  // step length taken, 0 if no decrease was found
+  int cg_iterations = 0;
+  double cg_residual = 0.0;
+};
+
+class SolidNewton {
+ public:
+  explicit SolidNewton(SolidEnergy energy) : energy_(std::move(energy)) {}
+
+  const SolidEnergy& energy() const { return energy_; }
+
+  // One inexact Newton step from x (n, 3), which it replaces. The energy never rises, and with
+  // epsilon = 0 no tet turns over.
+  // \throws SolverError if the energy at x is not finite or the linear solve breaks down.
+  NewtonReport step(Points& x, const EnergyWeights& w, const NewtonOptions& options,
+                    const Poll& poll = {});
+
+ private:
+  SolidEnergy energy_;
+  std::unique_ptr<BlockSolver> solver_;
+};
+
+}  // namespace stretchmap

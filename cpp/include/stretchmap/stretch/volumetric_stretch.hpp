@@ -1,0 +1,41 @@
+// The linear solves of Algorithm 5.1: the harmonic start (step 4) and the fixed-point step (8-9).
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/stretch/tet_laplacian.hpp"
+
+namespace stretchmap {
+
+class VolumetricStretch {
+ public:
+  // rest_volumes (k) positive; fixed (n) marks the prescribed vertices; backend as in SpdOptions.
+  // Image and rest volumes must be on the same scale for c of (5.6) to mean the same on every mesh.
+  VolumetricStretch(const TetsRef& tets, const FlagsRef& fixed, const VecRef& rest_volumes,
+                    std::string backend);
+
+  // Replaces the free rows of x (n, 3) by the harmonic extension of the prescribed ones; the
+  // Laplacian is that of the source positions (n, 3).
+  SolveReport harmonic(const PointsRef& source, Points& x, const SolveOptions& options,
+                       const Poll& poll = {});
+
+  // One step of (5.5) with the regularisation c >= 0 of (5.6), warm-started from x.
+  SolveReport step(Points& x, double c, const SolveOptions& options, const Poll& poll = {});
+
+  // "direct", "multigrid" or "jacobi"; empty before the first solve.
+  std::string backend() const { return solver_ ? solver_->backend() : std::string(); }
+
+ private:
+  SolveReport solve(const PointsRef& geometry, const Vec& coef, Points& x,
+                    const SolveOptions& options, const Poll& poll);
+
+  Tets tets_;
+  Vec rest_volumes_;
+  TetLaplacian laplacian_;
+  std::string wanted_backend_;
+  std::unique_ptr<SpdSolver> solver_;
+};
+
+}  // namespace stretchmap

@@ -1,0 +1,358 @@
+#include "stretchmap/stretch/solid_energy.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+namespace stretchmap {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::RowVector3d;
+using Eigen::Vector3d;
+using Block = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+
+// Position along the Z-order curve with 10 bits an axis.
+std::uint32_t z_order(const RowVector3d& unit) {
+  std::uint32_t code = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto cell = static_cast<std::uint32_t>(std::clamp(unit[axis], 0.0, 0.999999) * 1024.0);
+    for (int bit = 0; bit < 10; ++bit) code |= ((cell >> bit) & 1u) << (3 * bit + axis);
+  }
+  return code;
+}
+
+int thread_count() {
+#ifdef _OPENMP
+  return omp_get_max_threads();
+#else
+  return 1;
+#endif
+}
+
+// Sum in blocks of fixed size: the result does not depend on the number of threads.
+double blocked_sum(const Vec& values) {
+  constexpr Index kBlock = 4096;
+  const Index n = static_cast<Index>(values.size());
+  double sum = 0.0;
+  for (Index first = 0; first < n; first += kBlock)
+    sum += values.segment(first, std::min(kBlock, n - first)).sum();
+  return sum;
+}
+
+// Smallest root in (0, limit] of d0 + d1 a + d2 a^2 + d3 a^3 with d0 > 0; limit if there is none.
+double first_root(double d0, double d1, double d2, double d3, double limit) {
+  const auto p = [&](double a) { return d0 + a * (d1 + a * (d2 + a * d3)); };
+  // Bernstein coefficients on [0, limit]: all positive means no root.
+  const double b1 = d0 + d1 * limit / 3.0;
+  const double b2 = d0 + 2.0 * d1 * limit / 3.0 + d2 * limit * limit / 3.0;
+  if (b1 > 0 && b2 > 0 && p(limit) > 0) return limit;
+  // March with a Lipschitz bound of the derivative: never steps over a root.
+  const double bound = std::abs(d1) + limit * (2.0 * std::abs(d2) + 3.0 * limit * std::abs(d3));
+  double a = 0.0;
+  for (int k = 0; k < 64; ++k) {
+    const double value = p(a);
+    if (value <= 1e-3 * d0) return a;
+    a += value / bound;
+    if (a >= limit) return limit;
+  }
+  return a;
+}
+
+}  // namespace
+
+SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
+                         const FlagsRef& motion, double R, double r, const PointsRef& x)
+    : motion_(motion), R_(R), r_(r) {
+  const Index n = static_cast<Index>(motion.size()), k = static_cast<Index>(tets.rows());
+  const RowVector3d low = x.colwise().minCoeff();
+  const double size = std::max((x.colwise().maxCoeff() - low).maxCoeff(), 1e-300);
+  std::vector<std::uint32_t> code(n);
+  std::vector<Index> active;
+  for (Index i = 0; i < n; ++i) {
+    if (motion[i] == kFixed) continue;
+    code[i] = z_order((x.row(i) - low) / size);
+    active.push_back(i);
+  }
+  std::stable_sort(active.begin(), active.end(),
+                   [&](Index a, Index b) { return code[a] < code[b]; });
+  row_vertex_ = Eigen::Map<const IndexVec>(active.data(), static_cast<Index>(active.size()));
+  vertex_row_.setConstant(n, -1);
+  for (Index row = 0; row < row_vertex_.size(); ++row) vertex_row_[row_vertex_[row]] = row;
+
+  std::vector<Index> lowest(k), order(k);
+  for (Index t = 0; t < k; ++t) {
+    lowest[t] = std::numeric_limits<Index>::max();
+    for (int a = 0; a < 4; ++a)
+      if (vertex_row_[tets(t, a)] >= 0) lowest[t] = std::min(lowest[t], vertex_row_[tets(t, a)]);
+  }
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Index a, Index b) { return lowest[a] < lowest[b]; });
+  tets_.resize(k, 4);
+  rest_.resize(k, 9);
+  weights_.resize(k);
+  for (Index t = 0; t < k; ++t) {
+    tets_.row(t) = tets.row(order[t]);
+    rest_.row(t) = rest.row(order[t]);
+    weights_[t] = weights[order[t]];
+  }
+  build_pattern();
+}
+
+void SolidEnergy::build_pattern() {
+  const Index n_rows = rows(), k = static_cast<Index>(tets_.rows());
+  // Incidence row -> tets, then the sorted union of their rows.
+  std::vector<Index> start(n_rows + 1, 0);
+  for (Index t = 0; t < k; ++t)
+    for (int a = 0; a < 4; ++a)
+      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) ++start[row + 1];
+  for (Index row = 0; row < n_rows; ++row) start[row + 1] += start[row];
+  std::vector<Index> incident(start[n_rows]), cursor(start.begin(), start.end() - 1);
+  for (Index t = 0; t < k; ++t)
+    for (int a = 0; a < 4; ++a)
+      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) incident[cursor[row]++] = t;
+
+  row_ptr_.resize(n_rows + 1);
+  row_ptr_[0] = 0;
+  std::vector<Index> columns, neighbours;
+  for (Index row = 0; row < n_rows; ++row) {
+    neighbours.assign(1, row);
+    for (Index p = start[row]; p < start[row + 1]; ++p)
+      for (int a = 0; a < 4; ++a)
+        if (const Index other = vertex_row_[tets_(incident[p], a)]; other >= 0)
+          neighbours.push_back(other);
+    std::sort(neighbours.begin(), neighbours.end());
+    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
+    columns.insert(columns.end(), neighbours.begin(), neighbours.end());
+    row_ptr_[row + 1] = static_cast<Index>(columns.size());
+  }
+  col_ = Eigen::Map<const IndexVec>(columns.data(), static_cast<Index>(columns.size()));
+
+  slot_.setConstant(k, 16, -1);
+#pragma omp parallel for schedule(static)
+  for (Index t = 0; t < k; ++t) {
+    for (int a = 0; a < 4; ++a) {
+      const Index row = vertex_row_[tets_(t, a)];
+      if (row < 0) continue;
+      const Index* first = col_.data() + row_ptr_[row];
+      const Index* last = col_.data() + row_ptr_[row + 1];
+      for (int b = 0; b < 4; ++b) {
+        const Index other = vertex_row_[tets_(t, b)];
+        if (other >= 0)
+          slot_(t, 4 * a + b) =
+              static_cast<Index>(std::lower_bound(first, last, other) - col_.data());
+      }
+    }
+  }
+
+  const Index parts = std::max<Index>(1, std::min<Index>(thread_count(), n_rows));
+  part_row_.resize(parts + 1);
+  for (Index p = 0; p <= parts; ++p)
+    part_row_[p] = static_cast<Index>(static_cast<std::int64_t>(n_rows) * p / parts);
+  part_tets_.assign(parts, {});
+  for (Index t = 0; t < k; ++t) {
+    for (Index p = 0; p < parts; ++p) {
+      bool touches = false;
+      for (int a = 0; a < 4; ++a) {
+        const Index row = vertex_row_[tets_(t, a)];
+        touches = touches || (row >= part_row_[p] && row < part_row_[p + 1]);
+      }
+      if (touches) part_tets_[p].push_back(t);
+    }
+  }
+}
+
+BlockMatrix SolidEnergy::pattern() const {
+  BlockMatrix matrix;
+  matrix.row_ptr = row_ptr_;
+  matrix.col = col_;
+  matrix.values.setZero(9 * col_.size());
+  return matrix;
+}
+
+Matrix3d SolidEnergy::jacobian(const PointsRef& x, Index t) const {
+  Matrix3d edges;
+  const RowVector3d origin = x.row(tets_(t, 0));
+  for (int a = 1; a < 4; ++a) edges.col(a - 1) = x.row(tets_(t, a)) - origin;
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rest(rest_.row(t).data());
+  return edges * rest;
+}
+
+EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
+  const Index k = static_cast<Index>(tets_.rows());
+  Vec energy(k), det(k);
+#pragma omp parallel for schedule(static)
+  for (Index t = 0; t < k; ++t) {
+    const Matrix3d J = jacobian(x, t);
+    det[t] = J.determinant();
+    energy[t] = weights_[t] * element_energy(J, w);
+  }
+  EnergyReport report;
+  report.energy = blocked_sum(energy);
+  report.min_det = k > 0 ? det.minCoeff() : 0.0;
+  report.flips = static_cast<Index>((det.array() <= 0.0).count());
+  return report;
+}
+
+// Adds the tet's share to the rows in [first, last).
+void SolidEnergy::add_element(const PointsRef& x, const EnergyWeights& w, Index t, Index first,
+                              Index last, Points& gradient, double* blocks) const {
+  Matrix3d P;
+  Matrix9 H;
+  element_energy(jacobian(x, t), w, P, &H);
+  P *= weights_[t];
+  H *= weights_[t];
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rest(rest_.row(t).data());
+  Eigen::Matrix<double, 4, 3> G;  // derivative of J's columns by the vertices
+  G.bottomRows<3>() = rest;
+  G.row(0) = -G.bottomRows<3>().colwise().sum();
+
+  std::array<Eigen::Matrix<double, 9, 3>, 4> half;  // H contracted with G on the right
+  for (int b = 1; b < 4; ++b)
+    half[b] =
+        H.middleCols<3>(0) * G(b, 0) + H.middleCols<3>(3) * G(b, 1) + H.middleCols<3>(6) * G(b, 2);
+  half[0] = -(half[1] + half[2] + half[3]);
+  for (int a = 0; a < 4; ++a) {
+    const Index row = vertex_row_[tets_(t, a)];
+    if (row < first || row >= last) continue;
+    gradient.row(row) += (P * G.row(a).transpose()).transpose();
+    for (int b = 0; b < 4; ++b) {
+      const Index at = slot_(t, 4 * a + b);
+      if (at < 0) continue;
+      Block(blocks + 9 * static_cast<std::ptrdiff_t>(at)) += G(a, 0) * half[b].middleRows<3>(0) +
+                                                             G(a, 1) * half[b].middleRows<3>(3) +
+                                                             G(a, 2) * half[b].middleRows<3>(6);
+    }
+  }
+}
+
+void SolidEnergy::linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+                            BlockMatrix& hessian) {
+  gradient.setZero(rows(), 3);
+  hessian.values.setZero();
+  const Index parts = static_cast<Index>(part_tets_.size());
+#pragma omp parallel for schedule(static, 1)
+  for (Index p = 0; p < parts; ++p) {
+    for (const Index t : part_tets_[p])
+      add_element(x, w, t, part_row_[p], part_row_[p + 1], gradient, hessian.values.data());
+  }
+  if ((motion_.array() == kGliding).any()) {
+    const Index n_rows = rows();
+#pragma omp parallel for schedule(static)
+    for (Index row = 0; row < n_rows; ++row) into_frames(x, row, gradient, hessian.values.data());
+  }
+}
+
+// Axes of a vertex: Cartesian, or along the torus' coordinate circles and its normal.
+Matrix3d SolidEnergy::frame(const PointsRef& x, Index vertex) const {
+  if (motion_[vertex] != kGliding) return Matrix3d::Identity();
+  const double rho = std::hypot(x(vertex, 0), x(vertex, 1));
+  const double cu = x(vertex, 0) / rho, su = x(vertex, 1) / rho;
+  const double v = std::atan2(x(vertex, 2), rho - R_);
+  const double cv = std::cos(v), sv = std::sin(v);
+  Matrix3d Q;
+  Q.col(0) << -su, cu, 0.0;
+  Q.col(1) << -sv * cu, -sv * su, cv;
+  Q.col(2) << cv * cu, cv * su, sv;
+  return Q;
+}
+
+// Rewrites one block row in vertex frames and, for a gliding vertex, adds the torus' own second
+// derivatives (clamped to stay positive semi-definite) and removes the normal unknown.
+void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
+                              double* blocks) const {
+  const Index vertex = row_vertex_[row];
+  const Matrix3d Q = frame(x, vertex);
+  const bool gliding = motion_[vertex] == kGliding;
+  const Vector3d g = Q.transpose() * gradient.row(row).transpose();
+  for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p) {
+    const Index other = row_vertex_[col_[p]];
+    if (!gliding && motion_[other] != kGliding) continue;
+    Block block(blocks + 9 * static_cast<std::ptrdiff_t>(p));
+    Matrix3d turned = Q.transpose() * block * frame(x, other);
+    if (gliding) turned.row(2).setZero();
+    if (motion_[other] == kGliding) turned.col(2).setZero();
+    if (gliding && other == vertex) {
+      const double rho = std::hypot(x(vertex, 0), x(vertex, 1));
+      const double cv = (rho - R_) / r_, sv = x(vertex, 2) / r_;
+      // Second derivatives of xi along arc length: uu is -radial / rho, vv is -normal / r,
+      // uv is -sin(v) e_u / rho, radial being cos(v) normal - sin(v) e_v.
+      Eigen::Matrix2d C;
+      C(0, 0) = -(cv * g[2] - sv * g[1]) / rho;
+      C(1, 1) = -g[2] / r_;
+      C(0, 1) = C(1, 0) = -sv * g[0] / rho;
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
+      eigen.computeDirect(C);
+      turned.topLeftCorner<2, 2>() += eigen.eigenvectors() *
+                                      eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                                      eigen.eigenvectors().transpose();
+      turned(2, 2) = 1.0;
+    }
+    block = turned;
+  }
+  gradient.row(row) = g.transpose();
+  if (gliding) gradient(row, 2) = 0.0;
+}
+
+Points SolidEnergy::move(const PointsRef& x, const PointsRef& step, double alpha) const {
+  Points moved = x;
+  const Index n_rows = rows();
+#pragma omp parallel for schedule(static)
+  for (Index row = 0; row < n_rows; ++row) {
+    const Index i = row_vertex_[row];
+    if (motion_[i] != kGliding) {
+      moved.row(i) += alpha * step.row(row);
+      continue;
+    }
+    const double rho = std::hypot(x(i, 0), x(i, 1));
+    const double u = std::atan2(x(i, 1), x(i, 0)) + alpha * step(row, 0) / rho;
+    const double v = std::atan2(x(i, 2), rho - R_) + alpha * step(row, 1) / r_;
+    const double radius = R_ + r_ * std::cos(v);
+    moved.row(i) << radius * std::cos(u), radius * std::sin(u), r_ * std::sin(v);
+  }
+  return moved;
+}
+
+double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) const {
+  const Index k = static_cast<Index>(tets_.rows());
+  Points direction = Points::Zero(x.rows(), 3);
+  for (Index row = 0; row < rows(); ++row)
+    direction.row(row_vertex_[row]) =
+        (frame(x, row_vertex_[row]) * step.row(row).transpose()).transpose();
+  double longest = 1.0 / 0.9;
+#pragma omp parallel for schedule(static) reduction(min : longest)
+  for (Index t = 0; t < k; ++t) {
+    Matrix3d E, D;
+    for (int a = 1; a < 4; ++a) {
+      E.col(a - 1) = x.row(tets_(t, a)) - x.row(tets_(t, 0));
+      D.col(a - 1) = direction.row(tets_(t, a)) - direction.row(tets_(t, 0));
+    }
+    const double d0 = E.determinant();
+    if (!(d0 > 0.0)) continue;
+    const auto det = [](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+      return a.dot(b.cross(c));
+    };
+    const double d1 = det(D.col(0), E.col(1), E.col(2)) + det(E.col(0), D.col(1), E.col(2)) +
+                      det(E.col(0), E.col(1), D.col(2));
+    const double d2 = det(D.col(0), D.col(1), E.col(2)) + det(D.col(0), E.col(1), D.col(2)) +
+                      det(E.col(0), D.col(1), D.col(2));
+    longest = std::min(longest, first_root(d0, d1, d2, D.determinant(), 1.0 / 0.9));
+  }
+  return std::min(1.0, 0.9 * longest);
+}
+
+Rows SolidEnergy::near_nullspace(const PointsRef& x) const {
+  Rows modes(3 * rows(), 3);
+  for (Index row = 0; row < rows(); ++row)
+    modes.middleRows<3>(3 * row) = frame(x, row_vertex_[row]).transpose();
+  return modes;
+}
+
+}  // namespace stretchmap
