@@ -1,0 +1,159 @@
+"""Samples are what they claim: topology, positive tets, volumes that converge to the exact ones."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from stretchmap import TetMesh, TriMesh, samples
+from stretchmap.errors import MissingDependencyError, OptionError, SolverError
+
+SOLID_TORI = {
+    "standard": samples.solid_torus,
+    "bumpy": samples.bumpy_torus,
+    "knot": samples.knot_tube,
+    "vertebra": samples.vertebra_like,
+}
+
+
+def euler(mesh: TriMesh) -> int:
+    return len(mesh.V) - len(mesh.edges) + len(mesh.F)
+
+
+@pytest.mark.parametrize("name", SOLID_TORI)
+@pytest.mark.parametrize("n_tets", [500, 6000])
+def test_solid_tori(name, n_tets):
+    solid = SOLID_TORI[name](n_tets)
+    assert len(solid.T) == pytest.approx(n_tets, rel=0.25)
+    assert solid.tet_volumes.min() > 0
+    assert len(np.unique(solid.T)) == len(solid.V)
+    solid.require_solid_torus()
+    assert euler(solid.surface) == 0
+    # The tets fill what the surface encloses: no gap, no overlap at the closing station.
+    assert solid.surface.volume == pytest.approx(solid.volume, rel=1e-12)
+
+
+def test_solid_torus_converges_to_the_exact_volume():
+    exact = 2 * np.pi**2 * 3.0
+    errors = [exact - samples.solid_torus(n).volume for n in (2_000, 16_000, 128_000)]
+    assert errors[0] > 0
+    for coarse, fine in itertools.pairwise(errors):
+        assert 3.0 < coarse / fine < 5.2  # second order: half the cell size, a quarter of the error
+
+
+def test_bumps_change_the_volume_as_they_should():
+    # The mean of (1 + a cos cos)^2 is 1 + a^2 / 4; the offset of the centroid averages out.
+    bumpy = samples.bumpy_torus(150_000, amplitude=0.3)
+    plain = samples.solid_torus(150_000)
+    assert bumpy.volume / plain.volume == pytest.approx(1 + 0.3**2 / 4, rel=5e-3)
+
+
+def test_torus_surface():
+    surface = samples.torus_surface(40, 30, 2.0, 0.5)
+    assert euler(surface) == 0
+    surface.require_genus_one()
+    assert surface.volume == pytest.approx(2 * np.pi**2 * 2.0 * 0.25, rel=0.02)
+    radial = np.hypot(surface.V[:, 0], surface.V[:, 1]) - 2.0
+    np.testing.assert_allclose(np.hypot(radial, surface.V[:, 2]), 0.5, rtol=1e-14)
+
+
+def test_knot_tube_keeps_its_radius_and_closes():
+    solid = samples.knot_tube(12_000, radius=0.3)
+    t = np.linspace(0, 2 * np.pi, 20_000)
+    rho = 2 + np.cos(3 * t)
+    curve = np.stack([rho * np.cos(2 * t), rho * np.sin(2 * t), np.sin(3 * t)], axis=1)
+    from scipy.spatial import cKDTree
+
+    distance = cKDTree(curve).query(solid.surface.V)[0]
+    np.testing.assert_allclose(distance, 0.3, rtol=1e-3)
+    # A frame that failed to close would leave one station twisted and its tets far from regular.
+    assert solid.tet_volumes.min() > 0.2 * solid.tet_volumes.mean()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_individual_vertebrae(seed):
+    solid = samples.vertebra_like(8_000, seed)
+    assert solid.tet_volumes.min() > 0
+    assert not np.array_equal(solid.V, samples.vertebra_like(8_000).V)
+    np.testing.assert_array_equal(solid.V, samples.vertebra_like(8_000, seed).V)
+
+
+def test_vertebra_pair():
+    pair = samples.vertebra_pair(40, seed=1, n_tets=(9_000, 14_000))
+    assert len(pair.source.V) != len(pair.target.V)
+    assert len(np.unique(pair.source_landmarks)) == 40
+    assert np.isin(pair.source_landmarks, pair.source.boundary_vertices).all()
+    assert np.isin(pair.target_landmarks, pair.target.boundary_vertices).all()
+    np.testing.assert_allclose(
+        pair.truth[pair.source_landmarks], pair.target.V[pair.target_landmarks], atol=1e-14
+    )
+    # The truth carries the source mesh onto the other individual without a fold.
+    carried = TetMesh(pair.truth, pair.source.T)
+    assert carried.tet_volumes.min() > 0
+    assert carried.volume == pytest.approx(pair.target.volume, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("surface", "chi", "volume"),
+    [(samples.sphere(8), 2, 4 / 3 * np.pi), (samples.double_torus(2), -2, 13.0)],
+)
+def test_closed_surfaces(surface, chi, volume):
+    surface.require_closed()
+    assert euler(surface) == chi
+    assert surface.volume == pytest.approx(volume, rel=0.02)
+
+
+def test_solids_that_are_no_tori():
+    for solid in (samples.ball(3), samples.solid_double_torus(1)):
+        assert solid.tet_volumes.min() > 0
+        assert solid.surface.volume == pytest.approx(solid.volume)
+
+
+def test_tetrahedralise_keeps_the_surface():
+    pytest.importorskip("tetgen")
+    surface = samples.torus_surface(30, 12)
+    solid = samples.tetrahedralise(surface, max_volume=0.02)
+    n = len(surface.V)
+    np.testing.assert_array_equal(solid.V[:n], surface.V)
+    np.testing.assert_array_equal(solid.boundary_vertices, np.arange(n))
+    assert {tuple(np.roll(f, -np.argmin(f))) for f in solid.surface.F} == {
+        tuple(np.roll(f, -np.argmin(f))) for f in surface.F
+    }
+    assert solid.tet_volumes.min() > 0
+    assert len(solid.T) > 2 * len(samples.tetrahedralise(surface).T)
+    assert solid.volume == pytest.approx(surface.volume, rel=1e-12)
+
+
+def test_tetrahedralise_refuses_a_surface_that_crosses_itself():
+    pytest.importorskip("tetgen")
+    surface = samples.torus_surface(30, 12)
+    V = surface.V.copy()
+    V[0] = -V[0]
+    with pytest.raises(SolverError):
+        samples.tetrahedralise(TriMesh(V, surface.F))
+
+
+def test_tetrahedralise_names_the_package_that_is_missing(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "tetgen", None)
+    with pytest.raises(MissingDependencyError, match="pip install"):
+        samples.tetrahedralise(samples.torus_surface(10, 5))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: samples.solid_torus(100),
+        lambda: samples.solid_torus(1000, 1.0, 2.0),
+        lambda: samples.bumpy_torus(1000, amplitude=1.5),
+        lambda: samples.torus_surface(2, 5),
+        lambda: samples.knot_tube(1000, radius=2.0),
+        lambda: samples.knot_tube(1000, p=2, q=4),
+        lambda: samples.vertebra_pair(100),
+        lambda: samples.ball(0),
+        lambda: samples.solid_double_torus(0),
+        lambda: samples.tetrahedralise(samples.torus_surface(10, 5), quality=0.5),
+    ],
+)
+def test_bad_parameters(call):
+    with pytest.raises(OptionError):
+        call()
