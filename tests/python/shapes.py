@@ -1,0 +1,60 @@
+"""Small meshes of known topology: boxes of cubes cut into tets, and a torus of revolution."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+# The six tets of a cube round its diagonal: neighbouring cubes then agree on their common square.
+_KUHN = np.array(
+    [
+        [np.zeros(3, int), *np.cumsum(np.eye(3, dtype=int)[list(p)], axis=0)]
+        for p in permutations(range(3))
+    ]
+)
+
+
+def cubes(filled: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Tets of all filled cells of a grid, positively oriented, every point in use."""
+    corners = np.argwhere(filled)[:, None, None, :] + _KUHN
+    points, ids = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    tets = ids.reshape(-1, 4).astype(np.int32)
+    x = points[tets].astype(float)
+    negative = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
+    tets[negative] = tets[negative][:, [0, 1, 3, 2]]
+    return points.astype(float), tets
+
+
+def box(*shape: int, holes: tuple[tuple[int, int, int], ...] = ()) -> NDArray[np.bool_]:
+    """All cells of a grid but the ones named."""
+    filled = np.ones(shape, bool)
+    for hole in holes:
+        filled[hole] = False
+    return filled
+
+
+BALL = box(1, 1, 1)
+RING = box(3, 3, 1, holes=((1, 1, 0),))
+DOUBLE = box(5, 3, 1, holes=((1, 1, 0), (3, 1, 0)))
+SHELL = box(3, 3, 3, holes=((1, 1, 1),))
+
+
+def thick_ring_with_bubble() -> NDArray[np.bool_]:
+    """A solid torus with a cavity."""
+    filled = box(7, 7, 3, holes=((1, 1, 1),))
+    filled[3, 3, :] = False
+    return filled
+
+
+def torus(nu: int = 12, nv: int = 8) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """A torus of revolution with outward faces."""
+    u, v = np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij")
+    a, b = 2 * np.pi * u / nu, 2 * np.pi * v / nv
+    rho = 1 + 0.4 * np.cos(b)
+    points = np.stack([rho * np.cos(a), rho * np.sin(a), 0.4 * np.sin(b)], axis=-1).reshape(-1, 3)
+    i, j = (u + 1) % nu, (v + 1) % nv
+    p, q, r, s = u * nv + v, i * nv + v, i * nv + j, u * nv + j
+    lower, upper = np.stack([p, q, r], -1), np.stack([p, r, s], -1)
+    return points, np.concatenate([lower, upper]).reshape(-1, 3).astype(np.int32)
