@@ -13,14 +13,26 @@ namespace stretchmap::linalg {
 
 inline constexpr Index kChunk = 2048;  // rows per chunk
 
-inline Index chunk_count(Index n) { return (n + kChunk - 1) / kChunk; }
+inline Index chunk_count(Index n, Index size = kChunk) { return (n + size - 1) / size; }
 
 // body(begin, end) for every chunk of [0, n).
 template <class Body>
-void for_chunks(Index n, const Body& body) {
-  const Index chunks = chunk_count(n);
+void for_chunks(Index n, const Body& body, Index size = kChunk) {
+  const Index chunks = chunk_count(n, size);
 #pragma omp parallel for schedule(static) if (chunks > 1)
-  for (Index c = 0; c < chunks; ++c) body(c * kChunk, std::min(n, (c + 1) * kChunk));
+  for (Index c = 0; c < chunks; ++c) body(c * size, std::min(n, (c + 1) * size));
+}
+
+// The same with a workspace per thread, made by make(); results must not depend on which.
+template <class Make, class Body>
+void for_chunks_with(Index n, const Make& make, const Body& body, Index size = kChunk) {
+  const Index chunks = chunk_count(n, size);
+#pragma omp parallel if (chunks > 1)
+  {
+    auto workspace = make();
+#pragma omp for schedule(static)
+    for (Index c = 0; c < chunks; ++c) body(c * size, std::min(n, (c + 1) * size), workspace);
+  }
 }
 
 // body(begin, end, sums) adds to sums[0 .. K-1]; the chunks' sums are added in order.

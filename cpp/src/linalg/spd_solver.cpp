@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "cholesky.hpp"
+#include "multigrid.hpp"
+#include "ordering.hpp"
 #include "parallel.hpp"
 #include "pcg.hpp"
 #include "spmv.hpp"
@@ -65,8 +67,12 @@ struct SpdSolver::State {
   SparseMatrix A;
   std::string backend;
   std::optional<Cholesky> cholesky;
-  Vec inverse;
+  Vec inverse;               // jacobi
+  std::vector<Index> order;  // multigrid: order[new] = old
+  Multigrid<1, 1> multigrid;
+  bool hierarchy = false;
 
+  void factor_multigrid();
   template <int K>
   PcgResult<K> direct(const double* b, double* x, const SolveOptions& options);
   template <int K>
@@ -99,11 +105,26 @@ const std::string& SpdSolver::backend() const { return state_->backend; }
 void SpdSolver::refactor() {
   State& s = *state_;
   s.inverse = inverse_diagonal(s.A);
+  if (s.backend == "multigrid") s.factor_multigrid();
   if (s.backend != "direct") return;
   if (s.cholesky)
     s.cholesky->refactor(s.A);
   else
     s.cholesky.emplace(s.A);
+}
+
+void SpdSolver::State::factor_multigrid() {
+  if (!hierarchy) {
+    const Index n = static_cast<Index>(A.rows());
+    order = breadth_first_order(n, A.outerIndexPtr(), A.innerIndexPtr());
+    multigrid.finest().set_pattern(n, A.outerIndexPtr(), A.innerIndexPtr(), order);
+  }
+  multigrid.finest().set_values(A.valuePtr());
+  if (hierarchy)
+    multigrid.refresh();
+  else
+    multigrid.setup(std::vector<double>(order.size(), 1.0));
+  hierarchy = true;
 }
 
 template <int K>
@@ -128,8 +149,14 @@ PcgResult<K> SpdSolver::State::iterative(const double* b, double* x, const Solve
         for (int k = 0; k < K; ++k) out[K * i + k] = inverse[i] * in[K * i + k];
     });
   };
-  const PcgSystem system{n, [&](const double* in, double* out) { multiply<K>(A, in, out); },
-                         jacobi};
+  if (backend == "jacobi") {
+    const PcgSystem system{n, [&](const double* in, double* out) { multiply<K>(A, in, out); },
+                           jacobi};
+    return pcg<K>(system, b, x, options, poll);
+  }
+  const PcgSystem system{
+      n, [&](const double* in, double* out) { multigrid.finest().multiply<K>(in, out); },
+      [&](const double* in, double* out) { multigrid.precondition<K>(in, out); }};
   return pcg<K>(system, b, x, options, poll);
 }
 
@@ -141,15 +168,18 @@ void SpdSolver::State::columns(const RowsRef& B, Eigen::Ref<Rows>& X, Index firs
       Eigen::Matrix<double, Eigen::Dynamic, K, K == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
   const Index used = std::min<Index>(K, static_cast<Index>(B.cols()) - first);
   Columns b = Columns::Zero(B.rows(), K), x = Columns::Zero(B.rows(), K);
-  b.leftCols(used) = B.middleCols(first, used);
-  x.leftCols(used) = X.middleCols(first, used);
+  const auto old_row = [&](Index i) { return order.empty() ? i : order[i]; };
+  for (Index i = 0; i < B.rows(); ++i) {
+    b.row(i).head(used) = B.row(old_row(i)).segment(first, used);
+    x.row(i).head(used) = X.row(old_row(i)).segment(first, used);
+  }
   const PcgResult<K> result = backend == "direct" ? direct<K>(b.data(), x.data(), options)
                                                   : iterative<K>(b.data(), x.data(), options, poll);
   if (!result.finite)
     throw Error("SolverError", "a value that is not finite appeared while solving");
   if (result.negative_curvature)
     throw Error("SolverError", "the matrix is not positive definite (negative curvature)");
-  X.middleCols(first, used) = x.leftCols(used);
+  for (Index i = 0; i < B.rows(); ++i) X.row(old_row(i)).segment(first, used) = x.row(i).head(used);
   report.iterations = std::max(report.iterations, result.iterations);
   for (Index k = 0; k < used; ++k) report.residual[first + k] = result.residual[k];
 }

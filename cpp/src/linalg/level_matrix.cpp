@@ -1,0 +1,270 @@
+#include "level_matrix.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <type_traits>
+
+namespace stretchmap::linalg {
+namespace {
+
+using std::size_t;
+
+template <class T, int B>
+using RowBlock = Eigen::Matrix<T, B, B, B == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
+template <class T, int B>
+using ColBlock = Eigen::Matrix<T, B, B>;
+
+// sum -= block * x for column-major B x B blocks and K interleaved columns. With one column the
+// inner loop runs down the column of the block, else along the right-hand sides.
+template <int B, int K>
+inline void subtract(const float* block, const float* x, float* sum) {
+  if constexpr (K == 1) {
+    for (int c = 0; c < B; ++c)
+      for (int r = 0; r < B; ++r) sum[r] -= block[B * c + r] * x[c];
+  } else {
+    for (int c = 0; c < B; ++c)
+      for (int r = 0; r < B; ++r)
+        for (int k = 0; k < K; ++k) sum[K * r + k] -= block[B * c + r] * x[K * c + k];
+  }
+}
+
+// out = block * in
+template <int B, int K>
+inline void apply(const float* block, const float* in, float* out) {
+  float sum[B * K] = {};
+  subtract<B, K>(block, in, sum);
+  for (int k = 0; k < B * K; ++k) out[k] = -sum[k];
+}
+
+}  // namespace
+
+template <int B>
+void LevelMatrix<B>::set_pattern(Index rows, const Index* row_start, const Index* columns,
+                                 const std::vector<Index>& order) {
+  n = rows;
+  chunk = std::max<Index>(kChunk / B, (n + 15) / 16);
+  std::vector<Index> renumber(order.size());
+  for (size_t i = 0; i < order.size(); ++i) renumber[order[i]] = static_cast<Index>(i);
+  const auto old_row = [&](Index i) { return order.empty() ? i : order[i]; };
+  start.assign(static_cast<size_t>(n) + 1, 0);
+  for (Index i = 0; i < n; ++i)
+    start[i + 1] = start[i] + row_start[old_row(i) + 1] - row_start[old_row(i)] - 1;
+  lower.resize(n);
+  upper.resize(n);
+  diagonal_source.resize(n);
+  col.resize(static_cast<size_t>(start[n]));
+  source.resize(col.size());
+  struct Entry {
+    int group;
+    Index column, from;
+  };
+  for_chunks_with(
+      n, [] { return std::vector<Entry>(); },
+      [&](Index begin, Index end, std::vector<Entry>& entries) {
+        const Index first = begin, last = end;
+        for (Index i = begin; i < end; ++i) {
+          entries.clear();
+          for (Index e = row_start[old_row(i)]; e < row_start[old_row(i) + 1]; ++e) {
+            const Index j = order.empty() ? columns[e] : renumber[columns[e]];
+            if (j == i)
+              diagonal_source[i] = e;
+            else
+              entries.push_back({j < first || j >= last ? 0 : j < i ? 1 : 2, j, e});
+          }
+          std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+            return a.group != b.group ? a.group < b.group : a.column < b.column;
+          });
+          Index at = start[i];
+          lower[i] = upper[i] = at;
+          for (const Entry& entry : entries) {
+            col[at] = entry.column;
+            source[at++] = entry.from;
+            if (entry.group < 1) lower[i] = at;
+            if (entry.group < 2) upper[i] = at;
+          }
+        }
+      },
+      chunk);
+}
+
+template <int B>
+Index LevelMatrix<B>::set_values(const double* values) {
+  constexpr size_t kSize = B * B;
+  value.resize(kSize * col.size());
+  value_f.resize(kSize * col.size());
+  diagonal.resize(kSize * n);
+  for_chunks(n, [&](Index begin, Index end) {
+    for (size_t e = start[begin]; e < static_cast<size_t>(start[end]); ++e) {
+      const double* from = values + kSize * source[e];
+      for (int r = 0; r < B; ++r)
+        for (int c = 0; c < B; ++c) {
+          value[kSize * e + B * r + c] = from[B * r + c];
+          value_f[kSize * e + B * c + r] = static_cast<float>(from[B * r + c]);
+        }
+    }
+    for (size_t i = begin; i < static_cast<size_t>(end); ++i)
+      std::copy_n(values + kSize * diagonal_source[i], kSize, diagonal.data() + kSize * i);
+  });
+  std::vector<char> bad(n, 0);
+  set_diagonals(bad);
+  set_excess();
+  const auto first = std::find(bad.begin(), bad.end(), 1);
+  return first == bad.end() ? -1 : static_cast<Index>(first - bad.begin());
+}
+
+template <int B>
+void LevelMatrix<B>::set_diagonals(std::vector<char>& bad) {
+  constexpr size_t kSize = B * B;
+  inverse_f.resize(kSize * n);
+  for_chunks(n, [&](Index begin, Index end) {
+    for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
+      Eigen::Map<RowBlock<double, B>> block(diagonal.data() + kSize * i);
+      const Eigen::LLT<ColBlock<double, B>> llt(block);
+      if (llt.info() != Eigen::Success) {
+        // Only the smoother sees this: the absolute values of the eigenvalues, none too small.
+        bad[i] = 1;
+        const Eigen::SelfAdjointEigenSolver<ColBlock<double, B>> eigen(block);
+        const auto size = eigen.eigenvalues().cwiseAbs().eval();
+        const double floor = std::max(1e-6 * size.maxCoeff(), 1e-300);
+        block = eigen.eigenvectors() * size.cwiseMax(floor).asDiagonal() *
+                eigen.eigenvectors().transpose();
+      }
+      Eigen::Map<ColBlock<float, B>>(inverse_f.data() + kSize * i) =
+          block.inverse().template cast<float>();
+    }
+  });
+}
+
+template <int B>
+void LevelMatrix<B>::set_excess() {
+  constexpr size_t kSize = B * B;
+  excess.assign(n, 0.0f);
+  const auto size_of = [&](Index i) {
+    return Eigen::Map<const RowBlock<double, B>>(diagonal.data() + kSize * i).trace() / B;
+  };
+  for_chunks(n, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      if (lower[i] == start[i]) continue;
+      double coupling = 0.0;
+      for (Index e = start[i]; e < lower[i]; ++e)
+        coupling += Eigen::Map<const RowBlock<double, B>>(value.data() + kSize * e).norm() /
+                    std::sqrt(size_of(i) * size_of(col[e]));
+      const double enlarge = std::max(1.0, 0.5 * (1.0 + coupling));
+      excess[i] = static_cast<float>(1.0 - 1.0 / enlarge);
+      for (size_t k = 0; k < kSize; ++k) inverse_f[kSize * i + k] /= static_cast<float>(enlarge);
+    }
+  });
+}
+
+template <int B>
+template <int K>
+void LevelMatrix<B>::multiply(const double* x, double* y) const {
+  for_chunks(n, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      double sum[B * K] = {};
+      const auto add = [&](const double* block, const double* xe) {
+        for (int r = 0; r < B; ++r)
+          for (int c = 0; c < B; ++c)
+            for (int k = 0; k < K; ++k) sum[K * r + k] += block[B * r + c] * xe[K * c + k];
+      };
+      add(diagonal.data() + static_cast<size_t>(B * B) * i, x + static_cast<size_t>(B * K) * i);
+      for (Index e = start[i]; e < start[i + 1]; ++e)
+        add(value.data() + static_cast<size_t>(B * B) * e, x + static_cast<size_t>(B * K) * col[e]);
+      for (int k = 0; k < B * K; ++k) y[static_cast<size_t>(B * K) * i + k] = sum[k];
+    }
+  });
+}
+
+template <int B>
+template <int K>
+void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
+  constexpr size_t kBlock = B * B, kRow = B * K;
+  const auto subtract_range = [&](Index from, Index to, float* sum) {
+    for (Index e = from; e < to; ++e)
+      subtract<B, K>(value_f.data() + kBlock * e, x + kRow * col[e], sum);
+  };
+  for_chunks(
+      n,
+      [&](Index begin, Index end) {
+        for (Index i = begin; i < end; ++i) {
+          float sum[kRow];
+          for (size_t k = 0; k < kRow; ++k) sum[k] = b[kRow * i + k];
+          subtract_range(lower[i], upper[i], sum);
+          apply<B, K>(inverse_f.data() + kBlock * i, sum, x + kRow * i);
+        }
+      },
+      chunk);
+  // The sweep solved the earlier columns and the diagonal exactly; the rest is the residual.
+  for_chunks(n, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      float sum[kRow] = {};
+      if (excess[i] > 0.0f) {
+        for (size_t k = 0; k < kRow; ++k) sum[k] = b[kRow * i + k];
+        subtract_range(lower[i], upper[i], sum);
+        for (size_t k = 0; k < kRow; ++k) sum[k] *= excess[i];
+      }
+      subtract_range(start[i], lower[i], sum);
+      subtract_range(upper[i], start[i + 1], sum);
+      for (size_t k = 0; k < kRow; ++k) r[kRow * i + k] = sum[k];
+    }
+  });
+}
+
+template <int B>
+template <int K>
+void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) const {
+  constexpr size_t kBlock = B * B, kRow = B * K;
+  for_chunks(
+      n,
+      [&](Index begin, Index end) {
+        for (Index i = end - 1; i >= begin; --i) {
+          float sum[kRow];
+          for (size_t k = 0; k < kRow; ++k) sum[k] = b[kRow * i + k];
+          for (Index e = start[i]; e < upper[i]; ++e)
+            subtract<B, K>(value_f.data() + kBlock * e, y + kRow * col[e], sum);
+          for (Index e = upper[i]; e < start[i + 1]; ++e)
+            subtract<B, K>(value_f.data() + kBlock * e, x + kRow * col[e], sum);
+          apply<B, K>(inverse_f.data() + kBlock * i, sum, x + kRow * i);
+          for (size_t k = 0; k < kRow; ++k) x[kRow * i + k] += excess[i] * y[kRow * i + k];
+        }
+      },
+      chunk);
+}
+
+template <int B>
+void LevelMatrix<B>::scaled_multiply(const float* x, float* y) const {
+  constexpr size_t kBlock = B * B;
+  for_chunks(n, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      float sum[B] = {}, scaled[B];
+      for (Index e = start[i]; e < start[i + 1]; ++e)
+        subtract<B, 1>(value_f.data() + kBlock * e, x + static_cast<size_t>(B) * col[e], sum);
+      apply<B, 1>(inverse_f.data() + kBlock * i, sum, scaled);
+      for (int r = 0; r < B; ++r) {
+        const size_t at = static_cast<size_t>(B) * i + r;
+        y[at] = x[at] - scaled[r] / (1.0f - excess[i]);
+      }
+    }
+  });
+}
+
+template struct LevelMatrix<1>;
+template void LevelMatrix<1>::multiply<1>(const double*, double*) const;
+template void LevelMatrix<1>::multiply<2>(const double*, double*) const;
+template void LevelMatrix<1>::multiply<4>(const double*, double*) const;
+template void LevelMatrix<1>::sweep_forward<1>(const float*, float*, float*) const;
+template void LevelMatrix<1>::sweep_forward<2>(const float*, float*, float*) const;
+template void LevelMatrix<1>::sweep_forward<4>(const float*, float*, float*) const;
+template void LevelMatrix<1>::sweep_backward<1>(const float*, const float*, float*) const;
+template void LevelMatrix<1>::sweep_backward<2>(const float*, const float*, float*) const;
+template void LevelMatrix<1>::sweep_backward<4>(const float*, const float*, float*) const;
+template struct LevelMatrix<3>;
+template void LevelMatrix<3>::multiply<1>(const double*, double*) const;
+template void LevelMatrix<3>::sweep_forward<1>(const float*, float*, float*) const;
+template void LevelMatrix<3>::sweep_backward<1>(const float*, const float*, float*) const;
+template struct LevelMatrix<6>;
+template void LevelMatrix<6>::multiply<1>(const double*, double*) const;
+template void LevelMatrix<6>::sweep_forward<1>(const float*, float*, float*) const;
+template void LevelMatrix<6>::sweep_backward<1>(const float*, const float*, float*) const;
+
+}  // namespace stretchmap::linalg

@@ -1,0 +1,55 @@
+// The matrix of one level: products in double precision, smoothing in single precision.
+//
+// Smoothing is a Gauss-Seidel sweep inside each of a fixed number of row chunks, all chunks at once
+// (so the result does not depend on the number of threads). To let the sweeps run without a branch
+// the entries of a row are stored in three groups: columns in other chunks, earlier columns of the
+// same chunk, later columns of the same chunk; the diagonal is kept apart. Blocks are B x B.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "pattern.hpp"
+
+namespace stretchmap::linalg {
+
+template <int B>
+struct LevelMatrix {
+  Index n = 0;      // block rows
+  Index chunk = 0;  // block rows per chunk
+  // Entries of row i: [start[i], lower[i]) other chunks, [lower[i], upper[i]) earlier columns,
+  // [upper[i], start[i + 1]) later columns.
+  std::vector<Index> start, lower, upper, col;
+  std::vector<Index> source, diagonal_source;  // where the values come from, see set_values
+  std::vector<double> value, diagonal;         // row-major blocks
+  std::vector<float> value_f, inverse_f;       // column-major; inverse of the (enlarged) diagonal
+  // The diagonal is enlarged by 1 / (1 - excess) in rows whose couplings to other chunks would
+  // otherwise make the simultaneous sweeps diverge; zero nearly everywhere.
+  std::vector<float> excess;
+
+  // The pattern holds the diagonal and is structurally symmetric. order[new] = old renumbers rows
+  // and columns; empty: as it is.
+  void set_pattern(Index rows, const Index* row_start, const Index* columns,
+                   const std::vector<Index>& order);
+  // Values of the pattern's entries in its own order, row-major blocks. Returns the first row whose
+  // diagonal block is not positive definite (it is replaced by a positive one), -1 if none.
+  Index set_values(const double* values);
+
+  // y = A x, K columns.
+  template <int K>
+  void multiply(const double* x, double* y) const;
+  // x = M b with M one forward sweep from zero; r = b - A x.
+  template <int K>
+  void sweep_forward(const float* b, float* x, float* r) const;
+  // x = y + M' (b - A y), one backward sweep.
+  template <int K>
+  void sweep_backward(const float* b, const float* y, float* x) const;
+  // y = D^-1 A x with the single-precision values, one column.
+  void scaled_multiply(const float* x, float* y) const;
+
+ private:
+  void set_diagonals(std::vector<char>& bad);
+  void set_excess();
+};
+
+}  // namespace stretchmap::linalg

@@ -1,0 +1,68 @@
+// Smoothed-aggregation multigrid: one V-cycle in single precision as a preconditioner.
+#pragma once
+
+#include <vector>
+
+#include "level_matrix.hpp"
+#include "transfer.hpp"
+
+namespace stretchmap::linalg {
+
+// The coarsest matrix, inverted.
+class DenseInverse {
+ public:
+  // A in compressed rows with B x B blocks; a matrix that is not positive definite is replaced by
+  // the one with the absolute values of its eigenvalues.
+  void set(const Pattern& pattern, const std::vector<double>& values, int block);
+  template <int N>
+  void apply(const float* b, float* x) const;
+
+ private:
+  Index n_ = 0;
+  std::vector<float> inverse_;
+};
+
+template <int B, int K>
+struct Level {
+  LevelMatrix<B> A;
+  Transfer<B, K> transfer;
+  std::vector<float> b, x, y, r, probe;  // b: right-hand side, x: solution of this level
+
+  // Renews the transfer's numbers; `fresh`: the damping is estimated from scratch.
+  void set_transfer(bool fresh);
+  template <int N>
+  void descend(std::vector<float>& coarse_b);
+  template <int N>
+  void ascend(const std::vector<float>& coarse_x);
+};
+
+// B unknowns per row on the finest level, K (near-nullspace modes) on the others.
+template <int B, int K>
+class Multigrid {
+ public:
+  // The finest matrix; its values are set before setup and refresh.
+  LevelMatrix<B>& finest() { return finest_.A; }
+  const LevelMatrix<B>& finest() const { return finest_.A; }
+
+  // modes (n B K): near-nullspace in the finest matrix's numbering.
+  void setup(const std::vector<double>& modes);
+  // New values on the old aggregates and patterns.
+  void refresh();
+
+  // z = M r for N interleaved columns; M symmetric positive definite up to rounding.
+  template <int N>
+  void precondition(const double* r, double* z);
+
+  std::vector<Index> level_sizes() const;  // block rows, finest first, coarsest last
+  double operator_complexity() const;      // numbers stored on all levels over the finest's
+
+ private:
+  void set_values(bool fresh);
+  Level<B, K> finest_;
+  std::vector<Level<K, K>> coarse_;
+  Pattern last_pattern_;
+  DenseInverse last_;
+  std::vector<float> last_b_, last_x_;
+};
+
+}  // namespace stretchmap::linalg

@@ -1,0 +1,283 @@
+#include "transfer.hpp"
+
+#include <cmath>
+#include <utility>
+
+namespace stretchmap::linalg {
+namespace {
+
+using std::size_t;
+
+// The transpose of a pattern and, for each of its entries, the entry it came from.
+std::pair<Pattern, std::vector<Index>> transpose(const Pattern& p) {
+  Pattern t;
+  t.columns = p.rows();
+  t.start.assign(static_cast<size_t>(p.columns) + 1, 0);
+  for (Index c : p.col) ++t.start[c + 1];
+  for (Index c = 0; c < p.columns; ++c) t.start[c + 1] += t.start[c];
+  t.col.resize(p.col.size());
+  std::vector<Index> from(p.col.size());
+  std::vector<Index> next(t.start.begin(), t.start.end() - 1);
+  for (Index i = 0; i < p.rows(); ++i)
+    for (Index e = p.start[i]; e < p.start[i + 1]; ++e) {
+      const Index at = next[p.col[e]]++;
+      t.col[at] = i;
+      from[at] = e;
+    }
+  return {std::move(t), std::move(from)};
+}
+
+}  // namespace
+
+template <int B, int K>
+std::vector<double> Transfer<B, K>::setup(const LevelMatrix<B>& A, const std::vector<double>& modes,
+                                          double threshold) {
+  aggregates = aggregate(A, threshold);
+  std::vector<double> coarse_modes = orthonormal(A.n, modes);
+  set_patterns(A);
+  return coarse_modes;
+}
+
+// Gram-Schmidt, twice, on the modes restricted to each aggregate; a column that the others span
+// becomes zero.
+template <int B, int K>
+std::vector<double> Transfer<B, K>::orthonormal(Index n, const std::vector<double>& modes) {
+  tentative = modes;
+  Pattern member_rows;
+  member_rows.columns = aggregates.count;
+  member_rows.start.assign(static_cast<size_t>(n) + 1, 0);
+  for (Index i = 0; i < n; ++i) {
+    if (aggregates.of[i] >= 0) member_rows.col.push_back(aggregates.of[i]);
+    member_rows.start[i + 1] = static_cast<Index>(member_rows.col.size());
+  }
+  const Pattern members = transpose(member_rows).first;
+  std::vector<double> coarse_modes(static_cast<size_t>(K) * K * aggregates.count, 0.0);
+  for_chunks(aggregates.count, [&](Index begin, Index end) {
+    for (Index a = begin; a < end; ++a) {
+      const auto dot = [&](int c, int d) {
+        double sum = 0.0;
+        for (Index e = members.start[a]; e < members.start[a + 1]; ++e) {
+          const double* rows = tentative.data() + static_cast<size_t>(B) * K * members.col[e];
+          for (int b = 0; b < B; ++b) sum += rows[K * b + c] * rows[K * b + d];
+        }
+        return sum;
+      };
+      const auto combine = [&](int c, double keep, int d, double factor) {
+        for (Index e = members.start[a]; e < members.start[a + 1]; ++e) {
+          double* rows = tentative.data() + static_cast<size_t>(B) * K * members.col[e];
+          for (int b = 0; b < B; ++b)
+            rows[K * b + c] = keep * rows[K * b + c] + factor * rows[K * b + d];
+        }
+      };
+      double* R = coarse_modes.data() + static_cast<size_t>(K) * K * a;
+      for (int c = 0; c < K; ++c) {
+        const double before = std::sqrt(dot(c, c));
+        for (int pass = 0; pass < 2; ++pass)
+          for (int d = 0; d < c; ++d) {
+            const double share = dot(c, d);
+            R[K * d + c] += share;
+            combine(c, 1.0, d, -share);
+          }
+        const double norm = std::sqrt(dot(c, c));
+        const bool independent = norm > 1e-6 * before;
+        R[K * c + c] = independent ? norm : 0.0;
+        combine(c, independent ? 1.0 / norm : 0.0, c, 0.0);
+      }
+    }
+  });
+  return coarse_modes;
+}
+
+template <int B, int K>
+void Transfer<B, K>::set_patterns(const LevelMatrix<B>& A) {
+  const std::vector<Index>& of = aggregates.of;
+  p = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
+    if (of[i] >= 0) row.add(of[i]);
+    for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
+      if (aggregates.strong[e] && of[A.col[e]] >= 0) row.add(of[A.col[e]]);
+  });
+  std::tie(r, r_entry) = transpose(p);
+  const auto add_row = [](const Pattern& pattern, Index i, RowSet& row) {
+    for (Index e = pattern.start[i]; e < pattern.start[i + 1]; ++e) row.add(pattern.col[e]);
+  };
+  ap = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
+    add_row(p, i, row);
+    for (Index e = A.start[i]; e < A.start[i + 1]; ++e) add_row(p, A.col[e], row);
+  });
+  coarse = build_pattern(aggregates.count, aggregates.count, [&](Index a, RowSet& row) {
+    row.add(a);
+    for (Index e = r.start[a]; e < r.start[a + 1]; ++e) add_row(ap, r.col[e], row);
+  });
+}
+
+template <int B, int K>
+void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
+  constexpr size_t kSize = static_cast<size_t>(B) * K;
+  const std::vector<Index>& of = aggregates.of;
+  p_value.resize(kSize * p.col.size());
+  const auto rows = [&](Index begin, Index end, std::vector<Index>& slot) {
+    std::vector<double> sum;
+    for (Index i = begin; i < end; ++i) {
+      const Index first = p.start[i], length = p.start[i + 1] - first;
+      if (length == 0) continue;
+      for (Index s = 0; s < length; ++s) slot[p.col[first + s]] = s;
+      sum.assign(kSize * length, 0.0);
+      // sum = A T, B x K per slot, without the diagonal
+      double lumped = 0.0;
+      for (Index e = A.start[i]; e < A.start[i + 1]; ++e) {
+        const Index j = A.col[e];
+        const double* a = A.value.data() + static_cast<size_t>(B * B) * e;
+        if (!aggregates.strong[e]) {
+          if constexpr (B == 1) lumped += a[0];
+          continue;
+        }
+        if (of[j] < 0) continue;
+        const double* t = tentative.data() + kSize * j;
+        double* to = sum.data() + kSize * slot[of[j]];
+        for (int b = 0; b < B; ++b)
+          for (int c = 0; c < B; ++c)
+            for (int k = 0; k < K; ++k) to[K * b + k] += a[B * b + c] * t[K * c + k];
+      }
+      // P = T - damping (T + D^-1 sum)
+      const float* inverse = A.inverse_f.data() + static_cast<size_t>(B * B) * i;
+      double scale = -damping / (1.0 - A.excess[i]);
+      if constexpr (B == 1) {
+        const double d = A.diagonal[i];
+        scale = -damping * d / std::max(d + lumped, 0.1 * d) / (1.0 - A.excess[i]);
+      }
+      for (Index s = 0; s < length; ++s) {
+        float* out = p_value.data() + kSize * (first + s);
+        for (int b = 0; b < B; ++b)
+          for (int k = 0; k < K; ++k) {
+            double value = 0.0;
+            for (int c = 0; c < B; ++c) value += inverse[B * c + b] * sum[kSize * s + K * c + k];
+            out[K * b + k] = static_cast<float>(scale * value);
+          }
+      }
+      if (of[i] >= 0) {
+        float* out = p_value.data() + kSize * (first + slot[of[i]]);
+        for (size_t k = 0; k < kSize; ++k)
+          out[k] += static_cast<float>((1.0 - damping) * tentative[kSize * i + k]);
+      }
+    }
+  };
+  for_chunks_with(
+      A.n, [&] { return std::vector<Index>(aggregates.count); }, rows);
+  r_value.resize(p_value.size());
+  for_chunks(r.rows(), [&](Index begin, Index end) {
+    for (size_t e = r.start[begin]; e < static_cast<size_t>(r.start[end]); ++e)
+      for (size_t k = 0; k < kSize; ++k) r_value[kSize * e + k] = p_value[kSize * r_entry[e] + k];
+  });
+}
+
+template <int B, int K>
+std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const {
+  constexpr size_t kSize = static_cast<size_t>(B) * K, kCoarse = static_cast<size_t>(K) * K;
+  const auto make_slots = [&] { return std::vector<Index>(aggregates.count); };
+  std::vector<double> product(kSize * ap.col.size(), 0.0);
+  for_chunks_with(A.n, make_slots, [&](Index begin, Index end, std::vector<Index>& slot) {
+    for (Index i = begin; i < end; ++i) {
+      for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e) slot[ap.col[e]] = e;
+      const auto add = [&](const double* a, Index j) {
+        for (Index e = p.start[j]; e < p.start[j + 1]; ++e) {
+          const float* from = p_value.data() + kSize * e;
+          double* to = product.data() + kSize * slot[p.col[e]];
+          for (int b = 0; b < B; ++b)
+            for (int c = 0; c < B; ++c)
+              for (int k = 0; k < K; ++k) to[K * b + k] += a[B * b + c] * from[K * c + k];
+        }
+      };
+      add(A.diagonal.data() + static_cast<size_t>(B * B) * i, i);
+      for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
+        add(A.value.data() + static_cast<size_t>(B * B) * e, A.col[e]);
+    }
+  });
+  std::vector<double> values(kCoarse * coarse.col.size(), 0.0);
+  for_chunks_with(
+      coarse.rows(), make_slots,
+      [&](Index begin, Index end, std::vector<Index>& slot) {
+        for (Index a = begin; a < end; ++a) {
+          for (Index e = coarse.start[a]; e < coarse.start[a + 1]; ++e) slot[coarse.col[e]] = e;
+          for (Index e = r.start[a]; e < r.start[a + 1]; ++e) {
+            const Index i = r.col[e];
+            const float* left = r_value.data() + kSize * e;
+            for (Index f = ap.start[i]; f < ap.start[i + 1]; ++f) {
+              const double* right = product.data() + kSize * f;
+              double* to = values.data() + kCoarse * slot[ap.col[f]];
+              for (int b = 0; b < B; ++b)
+                for (int k = 0; k < K; ++k)
+                  for (int l = 0; l < K; ++l) to[K * k + l] += left[K * b + k] * right[K * b + l];
+            }
+          }
+          // A mode the aggregate cannot represent: an equation of its own keeps the matrix regular.
+          double* block = values.data() + kCoarse * slot[a];
+          double largest = 0.0;
+          for (int k = 0; k < K; ++k) largest = std::max(largest, block[(K + 1) * k]);
+          for (int k = 0; k < K; ++k)
+            if (block[(K + 1) * k] == 0.0 && K > 1)
+              block[(K + 1) * k] = largest > 0.0 ? largest : 1.0;
+        }
+      },
+      kChunk / 16);
+  return values;
+}
+
+template <int B, int K>
+template <int N>
+void Transfer<B, K>::restrict_to(const float* r_fine, float* b) const {
+  for_chunks(
+      r.rows(),
+      [&](Index begin, Index end) {
+        for (Index a = begin; a < end; ++a) {
+          float sum[K * N] = {};
+          for (Index e = r.start[a]; e < r.start[a + 1]; ++e) {
+            const float* block = r_value.data() + static_cast<size_t>(B * K) * e;
+            const float* from = r_fine + static_cast<size_t>(B * N) * r.col[e];
+            for (int row = 0; row < B; ++row)
+              for (int k = 0; k < K; ++k)
+                for (int j = 0; j < N; ++j)
+                  sum[N * k + j] += block[K * row + k] * from[N * row + j];
+          }
+          for (int k = 0; k < K * N; ++k) b[static_cast<size_t>(K * N) * a + k] = sum[k];
+        }
+      },
+      kChunk / 16);
+}
+
+template <int B, int K>
+template <int N>
+void Transfer<B, K>::prolong_add(const float* c, const float* x, float* y) const {
+  for_chunks(p.rows(), [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      float sum[B * N];
+      for (int k = 0; k < B * N; ++k) sum[k] = x[static_cast<size_t>(B * N) * i + k];
+      for (Index e = p.start[i]; e < p.start[i + 1]; ++e) {
+        const float* block = p_value.data() + static_cast<size_t>(B * K) * e;
+        const float* from = c + static_cast<size_t>(K * N) * p.col[e];
+        for (int row = 0; row < B; ++row)
+          for (int k = 0; k < K; ++k)
+            for (int j = 0; j < N; ++j) sum[N * row + j] += block[K * row + k] * from[N * k + j];
+      }
+      for (int k = 0; k < B * N; ++k) y[static_cast<size_t>(B * N) * i + k] = sum[k];
+    }
+  });
+}
+
+template struct Transfer<1, 1>;
+template void Transfer<1, 1>::restrict_to<1>(const float*, float*) const;
+template void Transfer<1, 1>::restrict_to<2>(const float*, float*) const;
+template void Transfer<1, 1>::restrict_to<4>(const float*, float*) const;
+template void Transfer<1, 1>::prolong_add<1>(const float*, const float*, float*) const;
+template void Transfer<1, 1>::prolong_add<2>(const float*, const float*, float*) const;
+template void Transfer<1, 1>::prolong_add<4>(const float*, const float*, float*) const;
+template struct Transfer<3, 3>;
+template void Transfer<3, 3>::restrict_to<1>(const float*, float*) const;
+template void Transfer<3, 3>::prolong_add<1>(const float*, const float*, float*) const;
+template struct Transfer<3, 6>;
+template void Transfer<3, 6>::restrict_to<1>(const float*, float*) const;
+template void Transfer<3, 6>::prolong_add<1>(const float*, const float*, float*) const;
+template struct Transfer<6, 6>;
+template void Transfer<6, 6>::restrict_to<1>(const float*, float*) const;
+template void Transfer<6, 6>::prolong_add<1>(const float*, const float*, float*) const;
+
+}  // namespace stretchmap::linalg
