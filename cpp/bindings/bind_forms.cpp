@@ -1,6 +1,8 @@
 #include "arrays.hpp"
 #include "stretchmap/forms/cotangent.hpp"
 #include "stretchmap/forms/harmonic.hpp"
+#include "stretchmap/forms/hodge.hpp"
+#include "stretchmap/forms/intrinsic_delaunay.hpp"
 
 namespace stretchmap::bindings {
 
@@ -11,12 +13,33 @@ void bind_forms(py::module_& m) {
         release_gil());
   m.def(
       "harmonic_forms",
-      [](const SurfaceTopology& top, const VecRef& weights, const RowsRef& eta) {
-        HarmonicSolution result = harmonic_forms(top, weights, eta);
+      [](Index n_vertices, const EdgesRef& edges, const VecRef& weights, const RowsRef& eta) {
+        HarmonicSolution result = harmonic_forms(n_vertices, edges, weights, eta);
         return std::make_tuple(std::move(result.forms), std::move(result.potentials),
                                std::move(result.gram));
       },
-      py::arg("topology"), py::arg("weights"), py::arg("eta"), release_gil());
+      py::arg("n_vertices"), py::arg("edges").noconvert(), py::arg("weights"), py::arg("eta"),
+      release_gil());
+  m.def("form_vectors", &form_vectors, py::arg("topology"), py::arg("points").noconvert(),
+        py::arg("form"), release_gil());
+  m.def(
+      "hodge_products",
+      [](const SurfaceTopology& top, const PointsRef& points, const RowsRef& forms) {
+        HodgeProducts products = hodge_products(top, points, forms);
+        return std::make_pair(std::move(products.star), std::move(products.wedge));
+      },
+      py::arg("topology"), py::arg("points").noconvert(), py::arg("forms"), release_gil());
+  m.def("chart_areas", &chart_areas, py::arg("topology"), py::arg("first"), py::arg("second"),
+        release_gil());
+  m.def(
+      "intrinsic_delaunay",
+      [](const SurfaceTopology& top, const VecRef& edge_length,
+         const Eigen::Ref<const IndexRows>& eta) {
+        IntrinsicDelaunay result = intrinsic_delaunay(top, edge_length, eta);
+        return std::make_tuple(std::move(result.edges), std::move(result.weights),
+                               std::move(result.eta), result.n_flips);
+      },
+      py::arg("topology"), py::arg("edge_length"), py::arg("eta").noconvert(), release_gil());
 }
 
 }  // namespace stretchmap::bindings

@@ -1,5 +1,7 @@
 #include "arrays.hpp"
 #include "stretchmap/homology/linking.hpp"
+#include "stretchmap/homology/shortest_loop.hpp"
+#include "stretchmap/homology/solid_cohomology.hpp"
 #include "stretchmap/homology/tree_cotree.hpp"
 
 namespace stretchmap::bindings {
@@ -24,6 +26,23 @@ void bind_homology(py::module_& m) {
         return linking_matrix(top, points, loops, signal_poll());
       },
       py::arg("topology"), py::arg("points").noconvert(), py::arg("loops"), release_gil());
+  m.def(
+      "shortest_loop",
+      [](const SurfaceTopology& top, const VecRef& length, const Eigen::Ref<const IndexRows>& forms,
+         const IndexVec& target, const Loop& crossing) {
+        return shortest_loop(top, length, forms, target, crossing, signal_poll());
+      },
+      py::arg("topology"), py::arg("edge_length"), py::arg("forms").noconvert(), py::arg("target"),
+      py::arg("crossing"), release_gil());
+  m.def(
+      "solid_cohomology",
+      [](const TetsRef& tets, const EdgesRef& edges, Index n_vertices,
+         const std::vector<Loop>& loops) {
+        SolidCohomology result = solid_cohomology(tets, edges, n_vertices, loops, signal_poll());
+        return std::make_pair(std::move(result.relations), std::move(result.loop_values));
+      },
+      py::arg("tets").noconvert(), py::arg("edges").noconvert(), py::arg("n_vertices"),
+      py::arg("loops"), release_gil());
 }
 
 }  // namespace stretchmap::bindings

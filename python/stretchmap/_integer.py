@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["complement", "integer_inverse", "integer_kernel"]
+__all__ = ["complement", "integer_inverse", "integer_kernel", "reduced_basis"]
 
 
 def integer_kernel(matrix: ArrayLike) -> NDArray[np.int64]:
@@ -21,11 +21,10 @@ def integer_kernel(matrix: ArrayLike) -> NDArray[np.int64]:
         Rows generate ``{x in Z^n : matrix x = 0}``; the lattice they span has no gaps.
     """
     matrix = np.asarray(matrix)
-    n = matrix.shape[1]
+    k, n = matrix.shape
     # Columns of [matrix; identity], reduced by unimodular column operations.
-    columns = [[int(x) for x in matrix[:, j]] + _unit(n, j) for j in range(n)]
-    free = columns
-    for row in range(matrix.shape[0]):
+    free = [[int(x) for x in matrix[:, j]] + [int(i == j) for i in range(n)] for j in range(n)]
+    for row in range(k):
         while True:
             active = [c for c in free if c[row]]
             if len(active) < 2:
@@ -36,12 +35,18 @@ def integer_kernel(matrix: ArrayLike) -> NDArray[np.int64]:
                     factor = c[row] // pivot[row]
                     c[:] = [x - factor * y for x, y in zip(c, pivot, strict=True)]
         free = [c for c in free if not c[row]]
-    basis = [c[matrix.shape[0] :] for c in free]
+    basis = [c[k:] for c in free]
     return np.array(basis, dtype=np.int64).reshape(len(basis), n)
 
 
 def complement(vector: ArrayLike) -> NDArray[np.int64]:
-    """For a primitive ``(p, q)`` a pair ``(s, t)`` with ``s q - p t = 1``."""
+    """For a primitive ``(p, q)`` a pair ``(s, t)`` with ``s q - p t = 1``.
+
+    Raises
+    ------
+    ValueError
+        If p and q have a common divisor.
+    """
     p, q = (int(x) for x in np.asarray(vector))
     # Extended Euclid on (|q|, |p|): s |q| + t |p| = 1.
     r0, r1, s0, s1, t0, t1 = abs(q), abs(p), 1, 0, 0, 1
@@ -56,13 +61,45 @@ def complement(vector: ArrayLike) -> NDArray[np.int64]:
 
 
 def integer_inverse(matrix: ArrayLike) -> NDArray[np.int64]:
-    """Inverse of a small integer matrix of determinant plus or minus one."""
+    """Inverse of a small integer matrix of determinant plus or minus one.
+
+    Raises
+    ------
+    ValueError
+        If it has none.
+    """
     matrix = np.asarray(matrix, dtype=np.int64)
-    inverse = np.rint(np.linalg.inv(matrix)).astype(np.int64)
-    if not np.array_equal(matrix @ inverse, np.eye(len(matrix), dtype=np.int64)):
+    if abs(abs(np.linalg.det(matrix)) - 1.0) > 1e-6:
         raise ValueError("the matrix has no integer inverse")
-    return inverse
+    return np.rint(np.linalg.inv(matrix)).astype(np.int64)
 
 
-def _unit(n: int, j: int) -> list[int]:
-    return [int(i == j) for i in range(n)]
+def reduced_basis(rows: ArrayLike, metric: ArrayLike) -> NDArray[np.int64]:
+    """Shorten the vectors of a lattice basis in a positive definite metric, shortest first.
+
+    Multiples of one row are taken from another as long as that makes it shorter.
+
+    Parameters
+    ----------
+    rows : (d, n) array_like of integers
+    metric : (n, n) array_like
+
+    Returns
+    -------
+    (d, n) ndarray of int64
+        A basis of the same lattice.
+    """
+    basis = np.array(rows, dtype=np.int64)
+    metric = np.asarray(metric, dtype=float)
+    shorter = True
+    while shorter:
+        shorter = False
+        for i in range(len(basis)):
+            for j in range(len(basis)):
+                length = basis[j] @ metric @ basis[j]
+                share = (basis[i] @ metric @ basis[j]) / length
+                if i != j and abs(share) > 0.5 + 1e-9:
+                    basis[i] -= round(share) * basis[j]
+                    shorter = True
+    lengths = np.einsum("ij,jk,ik->i", basis, metric, basis)
+    return basis[np.argsort(lengths, kind="stable")]

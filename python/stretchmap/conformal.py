@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
 from ._arrays import read_only
+from .errors import OptionError
+from .forms import WEIGHTS, HarmonicForms, harmonic_forms, holomorphic_forms
 from .homology import HomologyBasis, homology_basis
+from .results import IterationRecord, MapResult
 from .torus import Torus
 
 if TYPE_CHECKING:
+    from .measures import Distortion
     from .mesh import TriMesh
 
-__all__ = ["ConformalMap", "conformal_map"]
+__all__ = ["ConformalMap", "conformal_map", "conformal_torus", "hodge_lattice", "tube_angle"]
 
 
 @dataclass(frozen=True, eq=False)
-class ConformalMap:
-    """A conformal map to a flat torus, and from there to a torus of revolution.
+class ConformalMap(MapResult):
+    """A discrete conformal map to a flat torus, and from there to a torus of revolution.
 
     Attributes
     ----------
@@ -32,39 +40,94 @@ class ConformalMap:
     turns : ndarray, shape (n, 2)
         Coordinates along the longitude and along the meridian, in turns, defined modulo 1.
     gram : ndarray, shape (2, 2)
-        Inner products of the two harmonic forms.
+        Inner products of the two unit-period forms in cotangent weights.
     lattice : ndarray, shape (2, 2)
-        Rows: the periods of longitude and meridian in the plane, the first along x, scaled so that
-        the parallelogram has the area of the surface. ``turns @ lattice`` is the planar map.
+        Rows: the periods of longitude and meridian in the plane, the first along +x, scaled so that
+        the parallelogram has the area of the surface.
     aspect : float
         Length of the longitude's period over that of the meridian's, ``sqrt(G22 / G11)``.
     skew : float
-        Cosine of the angle between the periods, ``-G12 / sqrt(G11 G22)``.
+        Cosine of the angle between the periods, ``-G12 / sqrt(G11 G22)``. A torus of revolution has
+        none, so its image has an angle error that no map to it can avoid.
     conformal_energy : float
-        Conformal energy of the planar map over the area, ``sqrt(det G) - 1``.
+        Conformal energy (6.1) of the planar map over the area, ``sqrt(det G) - 1``.
+    weights : str
+        Weights of the harmonic forms, see `HarmonicForms`.
+    chart_areas : ndarray, shape (m,)
+        Signed area of each face in (u, v) turns; they sum to 1.
     torus : Torus
         The torus of revolution of that aspect, with the area of the surface.
     angles : ndarray, shape (n, 2)
         Angles (u, v) of the image in radians.
     image : ndarray, shape (n, 3)
         Points on ``torus``.
+    seconds : dict
     """
 
-    surface: TriMesh
-    basis: HomologyBasis
-    forms: NDArray[np.int32]
-    turns: NDArray[np.float64]
+    surface: TriMesh = field(repr=False)
+    basis: HomologyBasis = field(repr=False)
+    forms: NDArray[np.int32] = field(repr=False)
+    turns: NDArray[np.float64] = field(repr=False)
     gram: NDArray[np.float64]
     lattice: NDArray[np.float64]
     aspect: float
     skew: float
     conformal_energy: float
+    weights: str
+    chart_areas: NDArray[np.float64] = field(repr=False)
     torus: Torus
-    angles: NDArray[np.float64]
-    image: NDArray[np.float64]
+    angles: NDArray[np.float64] = field(repr=False)
+    image: NDArray[np.float64] = field(repr=False)
+    seconds: Mapping[str, float]
+    history: tuple[IterationRecord, ...] = ()
+
+    title = "conformal map"
+
+    @property
+    def flips(self) -> int:
+        """Faces that are folded over or collapsed in the flat chart."""
+        return int((self.chart_areas <= 0.0).sum())
+
+    @property
+    def plane(self) -> NDArray[np.float64]:
+        """(n, 2) planar map ``turns @ lattice``, defined modulo the rows of ``lattice``."""
+        return self.turns @ self.lattice
+
+    @cached_property
+    def distortion(self) -> Distortion:
+        """Measures of the image on the torus of revolution."""
+        from .measures import distortion
+
+        return distortion(self.surface, self.image, torus=self.torus)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the chart is free of folds; nothing is iterated."""
+        return self.flips == 0
+
+    @property
+    def stop_reason(self) -> str:
+        """What ``converged`` means here, in words."""
+        return "solved" if self.flips == 0 else f"solved, but {self.flips} faces are folded"
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """``angles`` and ``turns``, (n, 2) each, and ``lattice``."""
+        return {"angles": self.angles, "turns": self.turns, "lattice": self.lattice}
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """Aspect, skew, conformal energy, weights and folds in the flat chart."""
+        return {
+            "aspect": self.aspect,
+            "skew": self.skew,
+            "conformal_energy": self.conformal_energy,
+            "weights": self.weights,
+            "chart_flips": self.flips,
+        }
 
 
-def conformal_map(surface: TriMesh, basis: HomologyBasis | None = None) -> ConformalMap:
+def conformal_map(
+    surface: TriMesh, basis: HomologyBasis | None = None, *, weights: str = "auto"
+) -> ConformalMap:
     """Map a genus-one surface conformally onto a flat torus and a torus of revolution.
 
     Parameters
@@ -73,44 +136,82 @@ def conformal_map(surface: TriMesh, basis: HomologyBasis | None = None) -> Confo
         Closed surface of genus one.
     basis : HomologyBasis, optional
         From `homology_basis`; computed if left out.
+    weights : {"auto", "cotangent", "intrinsic_delaunay", "clamped"}
+        Weights of the harmonic forms, see `HarmonicForms`. ``"auto"`` takes the first of the three
+        whose chart has no fold; the last cannot fold but for rounding, the result says which it is.
+
+    Returns
+    -------
+    ConformalMap
 
     Raises
     ------
+    MeshError
+        As `homology_basis`.
     GenusError
         The genus is not one.
-    MeshError, SolverError
-        As `homology_basis`.
+    OptionError
+        Unknown weights.
+    SolverError
+        The Laplacian could not be factorised.
     """
+    if weights not in ("auto", *WEIGHTS):
+        raise OptionError(f"weights must be auto or one of {', '.join(WEIGHTS)}, not {weights!r}")
+    start = perf_counter()
     if basis is None:
         basis = homology_basis(surface)
     basis.require_torus()
-    change = basis.torus_matrix
-    gram = change @ basis.harmonic.gram @ change.T
-    turns = basis.harmonic.potentials @ change.T
-    root = math.sqrt(np.linalg.det(gram))
+    middle = perf_counter()
+    harmonic, forms, areas = _chart(surface, basis, WEIGHTS if weights == "auto" else (weights,))
+    cotangent = _core.cotangent_weights(surface.topology, surface.V)
+    gram = (forms * cotangent) @ forms.T
     aspect = math.sqrt(gram[1, 1] / gram[0, 0])
+    turns = harmonic.potentials @ basis.torus_matrix.T
     torus = conformal_torus(aspect).with_area(surface.area)
     angles = np.column_stack([2.0 * np.pi * turns[:, 0], tube_angle(turns[:, 1], aspect)])
+    image = torus.xi(angles[:, 0], angles[:, 1])
     return ConformalMap(
         surface=surface,
         basis=basis,
         forms=basis.torus_forms,
         turns=read_only(turns),
-        gram=gram,
-        lattice=_lattice(gram, surface.area),
+        gram=read_only(gram),
+        lattice=read_only(_lattice(gram, surface.area)),
         aspect=aspect,
-        skew=-gram[0, 1] / math.sqrt(gram[0, 0] * gram[1, 1]),
-        conformal_energy=root - 1.0,
+        skew=-float(gram[0, 1]) / math.sqrt(gram[0, 0] * gram[1, 1]),
+        conformal_energy=math.sqrt(np.linalg.det(gram)) - 1.0,
+        weights=harmonic.weights,
+        chart_areas=read_only(areas),
         torus=torus,
         angles=read_only(angles),
-        image=read_only(torus.xi(angles[:, 0], angles[:, 1])),
+        image=read_only(image),
+        seconds={"homology": middle - start, "conformal": perf_counter() - middle},
     )
 
 
-def conformal_torus(aspect: float) -> Torus:
-    """The torus of (3.15) that is conformally ``aspect`` by 1: r = a/b, not the printed root.
+def _chart(
+    surface: TriMesh, basis: HomologyBasis, choices: tuple[str, ...]
+) -> tuple[HarmonicForms, NDArray[np.float64], NDArray[np.float64]]:
+    """First of the weights without a fold, else the one with fewest: forms (2, e), areas (m,)."""
+    best = None
+    for weights in choices:
+        harmonic = harmonic_forms(surface, basis, weights=weights)
+        forms = basis.torus_matrix @ harmonic.forms
+        areas = _core.chart_areas(surface.topology, forms[0], forms[1])
+        folds = int((areas <= 0.0).sum())
+        if best is None or folds < best[0]:
+            best = (folds, harmonic, forms, areas)
+        if folds == 0:
+            break
+    return best[1:]
 
-    Centre radius ``sqrt(1 + aspect^2) / aspect``, tube radius ``1 / aspect``: every aspect embeds.
+
+def conformal_torus(aspect: float) -> Torus:
+    """The torus of (3.15) that is conformally ``aspect`` by 1.
+
+    The printed ``r = sqrt(aspect^2 - 1)`` is not conformal; with ``r = aspect`` the two derivatives
+    are ``r / D`` and ``1 / D``, ``D = sqrt(r^2 + 1) - cos v``, and every aspect embeds: centre
+    radius ``sqrt(1 + r^2) / r``, tube radius ``1 / r``.
     """
     return Torus(math.sqrt(1.0 + aspect * aspect) / aspect, 1.0 / aspect)
 
@@ -118,16 +219,66 @@ def conformal_torus(aspect: float) -> Torus:
 def tube_angle(turns: NDArray[np.float64], aspect: float) -> NDArray[np.float64]:
     """Angle around the tube, radians, of the conformal coordinate y of (3.15) given in turns.
 
-    The whole turns are kept: the angle minus 2 pi times the coordinate is periodic.
+    ``tan(v / 2) = tan(y / 2) (sqrt(1 + aspect^2) + 1) / aspect``, on the branch that is continuous
+    in y, so that v minus y is periodic.
     """
     whole = np.round(turns)
     y = 2.0 * np.pi * (turns - whole)
-    # tan(v/2) = k tan(y/2), k the ratio of the radii seen from the inner and the outer equator.
     scale = (math.sqrt(1.0 + aspect * aspect) + 1.0) / aspect
     return 2.0 * np.arctan2(scale * np.sin(0.5 * y), np.cos(0.5 * y)) + 2.0 * np.pi * whole
 
 
+def hodge_lattice(surface: TriMesh, basis: HomologyBasis | None = None) -> NDArray[np.float64]:
+    """The lattice by the paper's route: Hodge star (3.6)-(3.11), holomorphic forms, beta of (3.14).
+
+    It agrees with ``ConformalMap.lattice`` up to the conformal energy, the discrete star's square
+    being ``-det G`` instead of -1.
+
+    Parameters
+    ----------
+    surface : TriMesh
+        Closed surface of genus one.
+    basis : HomologyBasis, optional
+        From `homology_basis`; computed if left out.
+
+    Returns
+    -------
+    (2, 2) ndarray
+        Rows: periods of longitude and meridian, scaled and turned as in `ConformalMap`.
+
+    Raises
+    ------
+    MeshError, GenusError, SolverError
+        As `conformal_map`.
+    """
+    if basis is None:
+        basis = homology_basis(surface)
+    basis.require_torus()
+    coefficients = holomorphic_forms(surface, basis).coefficients
+    change = basis.torus_matrix
+    mu = change @ coefficients @ basis.torus_classes.T
+    periods = np.eye(2) + 1j * mu  # a_{l, j}: zeta_l over the longitude, over the meridian
+    beta = _most_rectangular(periods)
+    first, second = (1.0 - beta) * periods[0] + beta * periods[1]
+    ratio = second / first
+    length = math.sqrt(surface.area / ratio.imag)
+    return length * np.array([[1.0, 0.0], [ratio.real, ratio.imag]])
+
+
+def _most_rectangular(a: NDArray[np.complex128]) -> float:
+    """beta in [-1, 1] that minimises the square in (3.14)."""
+
+    def product(beta: float) -> float:
+        first, second = (1.0 - beta) * a[0] + beta * a[1]
+        return (first * second.conjugate()).real
+
+    middle, ends = product(0.0), (product(-1.0), product(1.0))
+    quadratic = [0.5 * (ends[0] + ends[1]) - middle, 0.5 * (ends[1] - ends[0]), middle]
+    candidates = [-1.0, 1.0]
+    candidates += [z.real for z in np.roots(quadratic)]  # roots, or the vertex where there are none
+    return min((b for b in candidates if -1.0 <= b <= 1.0), key=lambda b: product(b) ** 2)
+
+
 def _lattice(gram: NDArray[np.float64], area: float) -> NDArray[np.float64]:
     """Rows with ``rows @ rows.T = area sqrt(det gram) gram^-1``, the first along +x."""
-    periods = area * math.sqrt(np.linalg.det(gram)) * np.linalg.inv(gram)
-    return np.linalg.cholesky(periods)
+    return np.linalg.cholesky(area * math.sqrt(np.linalg.det(gram)) * np.linalg.inv(gram))

@@ -1,6 +1,7 @@
 #include "stretchmap/forms/harmonic.hpp"
 
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
@@ -9,52 +10,53 @@ namespace stretchmap {
 namespace {
 
 // Lower triangle of the Laplacian without row and column 0.
-Eigen::SparseMatrix<double> pinned_laplacian(const SurfaceTopology& top, const VecRef& weights) {
+Eigen::SparseMatrix<double> pinned_laplacian(Index n, const EdgesRef& edges,
+                                             const VecRef& weights) {
   std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(weights.size() + top.n_vertices);
-  Vec diagonal = Vec::Zero(top.n_vertices);
+  entries.reserve(weights.size() + n);
+  Vec diagonal = Vec::Zero(n);
   for (Index e = 0; e < weights.size(); ++e) {
-    const Index i = top.edges(e, 0), j = top.edges(e, 1);
+    const Index i = std::min(edges(e, 0), edges(e, 1)), j = std::max(edges(e, 0), edges(e, 1));
+    if (i == j) continue;
     diagonal[i] += weights[e];
     diagonal[j] += weights[e];
     if (i > 0) entries.emplace_back(j - 1, i - 1, -weights[e]);
   }
-  for (Index i = 1; i < top.n_vertices; ++i) entries.emplace_back(i - 1, i - 1, diagonal[i]);
-  Eigen::SparseMatrix<double> matrix(top.n_vertices - 1, top.n_vertices - 1);
+  for (Index i = 1; i < n; ++i) entries.emplace_back(i - 1, i - 1, diagonal[i]);
+  Eigen::SparseMatrix<double> matrix(n - 1, n - 1);
   matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
 }
 
 }  // namespace
 
-HarmonicSolution harmonic_forms(const SurfaceTopology& top, const VecRef& weights,
+HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const VecRef& weights,
                                 const RowsRef& eta) {
-  const Index n_edges = static_cast<Index>(top.edges.rows());
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(pinned_laplacian(top, weights));
+  const Index n_edges = static_cast<Index>(edges.rows());
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(
+      pinned_laplacian(n_vertices, edges, weights));
   if (solver.info() != Eigen::Success) {
     throw Error("SolverError",
-                "the surface Laplacian could not be factorised; look for "
-                "degenerate faces with diagnose()");
+                "the surface Laplacian could not be factorised; look for degenerate faces with "
+                "diagnose()");
   }
-  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(top.n_vertices, eta.rows());
+  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(n_vertices, eta.rows());
   for (Index e = 0; e < n_edges; ++e) {
-    divergence.row(top.edges(e, 0)) += weights[e] * eta.col(e).transpose();
-    divergence.row(top.edges(e, 1)) -= weights[e] * eta.col(e).transpose();
+    divergence.row(edges(e, 0)) += weights[e] * eta.col(e).transpose();
+    divergence.row(edges(e, 1)) -= weights[e] * eta.col(e).transpose();
   }
   HarmonicSolution result;
-  result.potentials.setZero(top.n_vertices, eta.rows());
-  result.potentials.bottomRows(top.n_vertices - 1) =
-      solver.solve(divergence.bottomRows(top.n_vertices - 1));
+  result.potentials.setZero(n_vertices, eta.rows());
+  result.potentials.bottomRows(n_vertices - 1) =
+      solver.solve(divergence.bottomRows(n_vertices - 1));
   if (!result.potentials.allFinite()) {
     throw Error("SolverError",
-                "the harmonic forms are not finite; look for degenerate faces with "
-                "diagnose()");
+                "the harmonic forms are not finite; look for degenerate faces with diagnose()");
   }
   result.forms = eta;
   for (Index e = 0; e < n_edges; ++e) {
     result.forms.col(e) +=
-        (result.potentials.row(top.edges(e, 1)) - result.potentials.row(top.edges(e, 0)))
-            .transpose();
+        (result.potentials.row(edges(e, 1)) - result.potentials.row(edges(e, 0))).transpose();
   }
   result.gram = result.forms * weights.asDiagonal() * result.forms.transpose();
   return result;

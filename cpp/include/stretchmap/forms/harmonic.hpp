@@ -1,4 +1,4 @@
-// Harmonic 1-forms of a weighted surface: (3.3)-(3.5) for many classes at once.
+// Harmonic 1-forms of a weighted graph of edges: (3.3)-(3.5) for many classes at once.
 #pragma once
 
 #include "stretchmap/base/types.hpp"
@@ -13,10 +13,12 @@ struct HarmonicSolution {
 };
 
 // Solves sum_j w_ij (eta([i, j]) + h_j - h_i) = 0 for every row of `eta` (k, e): one
-// factorisation of the Laplacian with vertex 0 pinned, k right-hand sides.
-// \pre    connected surface, eta closed, weights (e) with a positive definite pinned Laplacian.
+// factorisation of the Laplacian with vertex 0 pinned, k right-hand sides. Forms run along `edges`
+// from the first to the second vertex.
+// \pre    connected graph, eta closed on the surface, weights (e) with a positive definite pinned
+//         Laplacian.
 // \throws Error "SolverError" when the factorisation breaks down.
-HarmonicSolution harmonic_forms(const SurfaceTopology& top, const VecRef& weights,
+HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const VecRef& weights,
                                 const RowsRef& eta);
 
 }  // namespace stretchmap

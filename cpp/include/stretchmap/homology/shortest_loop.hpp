@@ -1,0 +1,25 @@
+// Shortest loop of edges in a homology class.
+#pragma once
+
+#include "stretchmap/base/types.hpp"
+#include "stretchmap/homology/tree_cotree.hpp"
+
+namespace stretchmap {
+
+// The shortest closed walk along edges whose period over form i is target[i].
+//
+// Every loop of the class has to pass through a vertex of a loop that it crosses algebraically.
+// So from each vertex of `crossing` the ball of half the best length so far is searched in the
+// universal abelian cover (a vertex and a sheet in Z^k, the sheet changing by the forms along each
+// edge); where the ball meets its translate by the target, a loop of the class closes. A vertex
+// done with is closed to later searches. The result is exact.
+// \param edge_length (e) positive
+// \param forms       (k, e) integer closed 1-forms, a basis of H^1
+// \param target      (k) not zero
+// \param crossing    a loop with non-zero intersection number with the class
+// \throws Error "SolverError" when no loop of the class passes through `crossing`.
+Loop shortest_loop(const SurfaceTopology& top, const VecRef& edge_length,
+                   const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
+                   const Loop& crossing, const Poll& poll = {});
+
+}  // namespace stretchmap
