@@ -8,6 +8,7 @@ void bind_mesh(py::module_& m);
 void bind_volume(py::module_& m);
 void bind_linalg(py::module_& m);
 void bind_distortion(py::module_& m);
+void bind_area(py::module_& m);
 }  // namespace stretchmap::bindings
 
 PYBIND11_MODULE(_core, m) {
@@ -30,4 +31,5 @@ PYBIND11_MODULE(_core, m) {
   bind_forms(m);
   bind_linalg(m);
   bind_distortion(m);
+  bind_area(m);
 }

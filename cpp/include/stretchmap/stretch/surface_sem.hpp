@@ -1,0 +1,55 @@
+// Stretch energy minimisation in the flat torus: Algorithm 4.1 with what cancels left out. A step
+// freezes L_S, solves (4.5) for both unit-period coordinates with one factorisation, and goes to
+// the exact minimum of E_S on the way there, never over a face.
+#pragma once
+
+#include <optional>
+
+#include "stretchmap/base/types.hpp"
+#include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/stretch/chart.hpp"
+#include "stretchmap/stretch/surface_pattern.hpp"
+
+namespace stretchmap {
+
+struct SurfaceFigures {
+  double energy = 0.0;   // of what is minimised
+  Index flips = 0;       // faces with no or negative area in the chart
+  double ring_sd = 0.0;  // standard deviation of the area ratios of vertex rings (6.3)
+  double face_sd = 0.0;  // and of faces
+};
+
+struct SemStep {
+  double step = 0.0;      // fraction of the way to the solution of (4.5)
+  double residual = 0.0;  // norm of the gradient of E_S before the step
+};
+
+class SurfaceSem {
+ public:
+  // areas (m): source areas, scaled here to total one; aspect: length of the torus along u over
+  // that along v; turns (n, 2): where to start, faces already turned over are allowed.
+  SurfaceSem(SurfaceChart chart, const VecRef& areas, double aspect, Points2 turns);
+
+  // \throws Error "SolverError" when the factorisation breaks down.
+  SemStep step();
+
+  SurfaceFigures figures() const;
+  const Points2& turns() const { return turns_; }
+
+ private:
+  double line_search(const Points2& direction) const;
+
+  SurfaceChart chart_;
+  Vec areas_;
+  Eigen::Vector2d periods_;
+  Points2 turns_;
+  SurfacePattern pattern_;
+  std::optional<SpdSolver> solver_;  // from the first step on
+};
+
+// Standard deviation of the ring ratios (6.3) and of the face ratios, from shares of the total area
+// (each sums to one): (ring, face).
+Eigen::Vector2d ratio_deviations(const FacesRef& faces, Index n_vertices, const VecRef& source,
+                                 const VecRef& image);
+
+}  // namespace stretchmap

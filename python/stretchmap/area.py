@@ -1,0 +1,289 @@
+"""Area-preserving map of a genus-one surface onto a torus of revolution, Algorithm 4.1."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from ._arrays import read_only
+from .conformal import ConformalMap, conformal_map, conformal_torus
+from .errors import OptionError
+from .measures import Distortion, distortion
+from .progress import Progress, report
+from .results import IterationRecord, MapResult
+from .torus import TWO_PI, Torus
+
+if TYPE_CHECKING:
+    from .homology import HomologyBasis
+    from .mesh import TriMesh
+
+__all__ = ["AreaMap", "area_map"]
+
+_log = logging.getLogger("stretchmap")
+
+_PHASES = 36  # first round of the search around the tube
+_RATIOS = (1.25, 1.5, 2.0, 2.5, 3.2, 4.0, 6.0, 10.0)  # first round of the search for R / r
+
+
+@dataclass(frozen=True, eq=False)
+class AreaMap(MapResult):
+    """An area-preserving map onto a torus of revolution.
+
+    Attributes
+    ----------
+    surface : TriMesh
+        The source.
+    angles : ndarray, shape (n, 2)
+        Angles (u, v) of the image in radians, not reduced to one turn: ``2 pi forms + d angles`` is
+        the change along an edge. They do not depend on the size of the torus.
+    image : ndarray, shape (n, 3)
+        Points on ``torus``.
+    torus : Torus
+        Torus with the surface's area and the ratio of radii in ``ratio``.
+    phase : float
+        Turns of the equal-area coordinate around the tube that were added to the conformal map's.
+    ratio : float
+        ``R / r`` of the torus.
+    forms : ndarray, shape (2, e), int32
+        Integer closed 1-forms of u and v, as in `ConformalMap`.
+    history : tuple of IterationRecord
+        One record per iteration: stage ``"sem"`` measured in the equal-area chart.
+    distortion : Distortion
+        Of the polyhedral image; a face is flipped where it is negative in the (u, v) chart.
+    converged : bool
+    stop_reason : str
+    seconds : dict
+        Wall-clock time per stage.
+    """
+
+    title = "area"
+
+    surface: TriMesh
+    angles: NDArray[np.float64]
+    image: NDArray[np.float64]
+    torus: Torus
+    phase: float
+    ratio: float
+    forms: NDArray[np.int32] = field(repr=False)
+    history: tuple[IterationRecord, ...] = field(repr=False)
+    distortion: Distortion
+    converged: bool
+    stop_reason: str
+    seconds: Mapping[str, float]
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """``angles`` (n, 2) and ``forms`` (2, e)."""
+        return {"angles": self.angles, "forms": self.forms}
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """``phase`` and ``ratio``."""
+        return {"phase": self.phase, "ratio": self.ratio}
+
+    def image_on(self, torus: Torus) -> NDArray[np.float64]:
+        """The same map on a torus of another size, (n, 3).
+
+        Raises
+        ------
+        OptionError
+            If the torus has another ratio of radii: the map would not preserve areas there.
+        """
+        if not math.isclose(torus.ratio, self.ratio, rel_tol=1e-9):
+            raise OptionError(f"the map is for R / r = {self.ratio}, the torus has {torus.ratio}")
+        return torus.xi(self.angles[:, 0], self.angles[:, 1])
+
+
+def area_map(
+    surface: TriMesh,
+    *,
+    basis: HomologyBasis | None = None,
+    conformal: ConformalMap | None = None,
+    phase: float | None = None,
+    ratio: str | float = "conformal",
+    sem_iter: int = 10,
+    progress: Progress | None = None,
+) -> AreaMap:
+    """Map a genus-one surface onto a torus of revolution so that areas are preserved.
+
+    Stretch energy minimisation (Algorithm 4.1) in the equal-area chart of the torus, then the
+    phase around the tube by a search on the polyhedral image.
+
+    Parameters
+    ----------
+    surface : TriMesh
+        Closed surface of genus one.
+    basis : HomologyBasis, optional
+        From `homology_basis`; computed if left out.
+    conformal : ConformalMap, optional
+        From `conformal_map`; computed if left out.
+    phase : float, optional
+        Turns to add to the equal-area coordinate around the tube; searched if left out.
+    ratio : "conformal", "search" or float
+        ``R / r``: that of the conformal map, the best found by a search, or given (above 1).
+    sem_iter : int
+        Most steps of stretch energy minimisation.
+    progress : Progress, optional
+        Called once per step.
+
+    Returns
+    -------
+    AreaMap
+
+    Raises
+    ------
+    OptionError
+        An option out of range.
+    GenusError, MeshError, SolverError
+        As `conformal_map`.
+    """
+    _check_options(phase, ratio, sem_iter)
+    clock = time.perf_counter()
+    seconds: dict[str, float] = {}
+    if conformal is None:
+        conformal = conformal_map(surface, basis)
+    clock = _lap(seconds, "conformal", clock)
+
+    chart = _core.SurfaceChart(surface.topology, conformal.forms)
+    turns, history = _minimise_stretch(surface, chart, conformal, sem_iter, progress)
+    clock = _lap(seconds, "sem", clock)
+
+    reference = _core.SurfaceReference(surface.V, surface.F)
+    phase, ratio = _search(reference, surface.F, turns, conformal.aspect, phase, ratio)
+    angles = _angles(turns, phase, ratio)
+    clock = _lap(seconds, "phase", clock)
+
+    torus = Torus.from_ratio(ratio, area=surface.area)
+    image = torus.xi(angles[:, 0], angles[:, 1])
+    figures = _measure(surface, chart, angles, image)
+    return AreaMap(
+        surface=surface,
+        angles=read_only(angles),
+        image=read_only(image),
+        torus=torus,
+        phase=phase,
+        ratio=ratio,
+        forms=conformal.forms,
+        history=tuple(history),
+        distortion=figures,
+        converged=figures.flips == 0,
+        stop_reason="iterations done",
+        seconds=seconds,
+    )
+
+
+def _check_options(phase: float | None, ratio: str | float, sem_iter: int) -> None:
+    if phase is not None and not math.isfinite(phase):
+        raise OptionError(f"phase must be finite, got {phase}")
+    if isinstance(ratio, str):
+        if ratio not in ("conformal", "search"):
+            raise OptionError(f"ratio must be 'conformal', 'search' or a number, got {ratio!r}")
+    elif not (math.isfinite(ratio) and ratio > 1.0):
+        raise OptionError(f"ratio R / r must be above 1 and finite, got {ratio}")
+    if sem_iter < 0:
+        raise OptionError(f"sem_iter must not be negative, got {sem_iter}")
+
+
+def _lap(seconds: dict[str, float], stage: str, start: float) -> float:
+    now = time.perf_counter()
+    seconds[stage] = now - start
+    return now
+
+
+def _minimise_stretch(
+    surface: TriMesh,
+    chart: _core.SurfaceChart,
+    conformal: ConformalMap,
+    max_iter: int,
+    progress: Progress | None,
+) -> tuple[NDArray[np.float64], list[IterationRecord]]:
+    """Steps of (4.5) in the chart until the energy is at its bound or stops falling."""
+    start = time.perf_counter()
+    sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, conformal.turns)
+    history: list[IterationRecord] = []
+    taken = None
+    for iteration in range(max_iter + 1):
+        if iteration:
+            taken = sem.step()
+        figures = sem.figures()
+        history.append(
+            IterationRecord(
+                stage="sem",
+                iteration=iteration,
+                energy=figures.energy,
+                step=math.nan if taken is None else taken.step,
+                residual=math.nan if taken is None else taken.residual,
+                flips=figures.flips,
+                ring_sd=figures.ring_sd,
+                element_sd=figures.face_sd,
+                seconds=time.perf_counter() - start,
+            )
+        )
+        report(progress, "area", iteration, max_iter, energy=figures.energy, flips=figures.flips)
+        if iteration and history[-2].energy - figures.energy <= 1e-4 * figures.energy:
+            break
+    return sem.turns, history
+
+
+def _search(
+    reference: _core.SurfaceReference,
+    faces: NDArray[np.int32],
+    turns: NDArray[np.float64],
+    aspect: float,
+    phase: float | None,
+    ratio: str | float,
+) -> tuple[float, float]:
+    """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image."""
+    phases = np.arange(_PHASES) / _PHASES if phase is None else np.array([float(phase)])
+    conformal = conformal_torus(aspect).ratio
+    if ratio == "search":
+        ratios = np.array([conformal, *_RATIOS])
+    else:
+        ratios = np.array([conformal if ratio == "conformal" else float(ratio)])
+    width = np.array([0.0 if phase is not None else 1.0 / _PHASES, 0.2 * (len(ratios) > 1)])
+    candidates = np.array([(p, r) for r in ratios for p in phases])
+    best = _best(reference, faces, turns, candidates)
+    while width.max() > 0.01:
+        width *= 0.5
+        offsets = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]) * width
+        candidates = np.unique(
+            np.column_stack(
+                [best[0] + offsets[:, 0], 1.0 + (best[1] - 1.0) * np.exp(offsets[:, 1])]
+            ),
+            axis=0,
+        )
+        best = _best(reference, faces, turns, candidates)
+    return float(best[0] if phase is not None else best[0] % 1.0), float(best[1])
+
+
+def _best(
+    reference: _core.SurfaceReference,
+    faces: NDArray[np.int32],
+    turns: NDArray[np.float64],
+    candidates: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    if len(candidates) == 1:
+        return candidates[0]
+    qualities = _core.phase_qualities(reference, faces, turns, candidates)
+    return candidates[int(np.argmin([quality.energy for quality in qualities]))]
+
+
+def _angles(turns: NDArray[np.float64], phase: float, ratio: float) -> NDArray[np.float64]:
+    """(u, v) in radians from (u, s) in turns."""
+    v = _core.angle_from_equal_area(TWO_PI * (turns[:, 1] + phase), 1.0 / ratio)
+    return np.column_stack([TWO_PI * turns[:, 0], v])
+
+
+def _measure(
+    surface: TriMesh,
+    chart: _core.SurfaceChart,
+    angles: NDArray[np.float64],
+    image: NDArray[np.float64],
+) -> Distortion:
+    return distortion(surface, image, angles=angles)
