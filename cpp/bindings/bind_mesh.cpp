@@ -1,4 +1,5 @@
 #include "arrays.hpp"
+#include "stretchmap/mesh/boundary_joins.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
 #include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/orient.hpp"
@@ -94,12 +95,30 @@ void bind_diagnosis(py::module_& m) {
       .def_readonly("boundary_genus", &SolidDiagnosis::boundary_genus);
 }
 
+void bind_boundary_joins(py::module_& m) {
+  py::class_<BoundaryJoins>(m, "BoundaryJoins")
+      .def(py::init(&boundary_joins), py::arg("tets").noconvert(), py::arg("n_vertices"),
+           release_gil())
+      .def_readonly("edges", &BoundaryJoins::edges)
+      .def_readonly("faces", &BoundaryJoins::faces)
+      .def_readonly("tets", &BoundaryJoins::tets);
+
+  py::class_<Refinement>(m, "Refinement")
+      .def(py::init(&refine_boundary_joins), py::arg("points").noconvert(),
+           py::arg("tets").noconvert(), release_gil())
+      .def_readonly("points", &Refinement::points)
+      .def_readonly("tets", &Refinement::tets)
+      .def_readonly("parent_tet", &Refinement::parent_tet)
+      .def_readonly("joins", &Refinement::joins);
+}
+
 }  // namespace
 
 void bind_mesh(py::module_& m) {
   bind_topology(m);
   bind_sizes(m);
   bind_diagnosis(m);
+  bind_boundary_joins(m);
 }
 
 }  // namespace stretchmap::bindings

@@ -1,0 +1,159 @@
+#include "stretchmap/mesh/boundary_joins.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "diagnosis_common.hpp"
+#include "stretchmap/mesh/facets.hpp"
+#include "stretchmap/mesh/tet_boundary.hpp"
+
+namespace stretchmap {
+namespace {
+
+using Tet = Eigen::Matrix<Index, 1, 4>;
+using Pair = Eigen::Matrix<Index, 1, 2>;
+using Triple = Eigen::Matrix<Index, 1, 3>;
+
+std::uint64_t key(Index a, Index b) {
+  return static_cast<std::uint64_t>(std::min(a, b)) << 32 |
+         static_cast<std::uint64_t>(std::max(a, b));
+}
+
+// One vertex to be added in a tet: it replaces each of `corners` (2 or 3 of them) in turn.
+struct Split {
+  Index tet;
+  Index vertex;
+  std::array<Index, 3> corners;
+  int width;
+};
+
+struct Plan {
+  BoundaryJoins joins;
+  std::vector<Split> splits;  // by tet, then by added vertex
+};
+
+// Sorted keys of the edges on the boundary.
+std::vector<std::uint64_t> boundary_edges(const TetBoundary& boundary) {
+  std::vector<std::uint64_t> keys;
+  keys.reserve(3 * boundary.faces.rows());
+  for (Index f = 0; f < boundary.faces.rows(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      keys.push_back(key(boundary.vertices[boundary.faces(f, k)],
+                         boundary.vertices[boundary.faces(f, (k + 1) % 3)]));
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+Plan plan_splits(const TetsRef& tets, Index n_vertices) {
+  const TetBoundary boundary = tet_boundary(tets, n_vertices);
+  const auto outside = [&](Index v) { return boundary.index[v] >= 0; };
+  const std::vector<std::uint64_t> rim = boundary_edges(boundary);
+  const auto on_rim = [&](Index a, Index b) {
+    return std::binary_search(rim.begin(), rim.end(), key(a, b));
+  };
+  Plan plan;
+  std::vector<Pair> edges;
+  const FacetGroups edge_groups = group_tet_edges(tets, n_vertices);
+  for (Index g = 0; g < edge_groups.size(); ++g) {
+    const Index first = edge_groups.start[g], last = edge_groups.start[g + 1];
+    const Index h = edge_groups.order[first];
+    const Index a = tets(h / 6, kTetEdge[h % 6][0]), b = tets(h / 6, kTetEdge[h % 6][1]);
+    if (!outside(a) || !outside(b) || on_rim(a, b)) continue;
+    const Index vertex = n_vertices + static_cast<Index>(edges.size());
+    edges.emplace_back(std::min(a, b), std::max(a, b));
+    for (Index p = first; p < last; ++p) {
+      plan.splits.push_back({edge_groups.order[p] / 6, vertex, {a, b, -1}, 2});
+    }
+  }
+  std::vector<Triple> faces;
+  const Index n_edges = static_cast<Index>(edges.size());
+  const FacetGroups face_groups = group_half_faces(tets, n_vertices);
+  for (Index g = 0; g < face_groups.size(); ++g) {
+    const Index first = face_groups.start[g];
+    if (face_groups.start[g + 1] - first < 2) continue;
+    const Triple f = half_face(tets, face_groups.order[first]);
+    if (!on_rim(f[0], f[1]) || !on_rim(f[1], f[2]) || !on_rim(f[2], f[0])) continue;
+    const Index vertex = n_vertices + n_edges + static_cast<Index>(faces.size());
+    faces.push_back(f);
+    for (const Index p : {first, first + 1}) {
+      plan.splits.push_back({face_groups.order[p] / 4, vertex, {f[0], f[1], f[2]}, 3});
+    }
+  }
+  std::sort(plan.splits.begin(), plan.splits.end(), [](const Split& a, const Split& b) {
+    return std::pair(a.tet, a.vertex) < std::pair(b.tet, b.vertex);
+  });
+  Mask touched(tets.rows(), 0);
+  for (const Split& split : plan.splits) touched[split.tet] = 1;
+  plan.joins.edges = detail::as_rows<Edges>(edges);
+  plan.joins.faces = detail::as_rows<Faces>(faces);
+  plan.joins.tets = set_entries(touched);
+  return plan;
+}
+
+// Replaces every piece that has all corners of the split by one piece per corner.
+void split_pieces(const Split& split, std::vector<Tet>& pieces) {
+  const std::size_t n = pieces.size();
+  for (std::size_t p = 0; p < n; ++p) {
+    const Tet piece = pieces[p];
+    std::array<int, 3> place{-1, -1, -1};
+    int found = 0;
+    for (int c = 0; c < split.width; ++c) {
+      for (int k = 0; k < 4; ++k) {
+        if (piece[k] == split.corners[c]) place[c] = k, ++found;
+      }
+    }
+    if (found < split.width) continue;
+    pieces[p][place[0]] = split.vertex;
+    for (int c = 1; c < split.width; ++c) {
+      pieces.push_back(piece);
+      pieces.back()[place[c]] = split.vertex;
+    }
+  }
+}
+
+}  // namespace
+
+BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices) {
+  return plan_splits(tets, n_vertices).joins;
+}
+
+Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets) {
+  const Index n = static_cast<Index>(points.rows());
+  Plan plan = plan_splits(tets, n);
+  const Index n_edges = static_cast<Index>(plan.joins.edges.rows());
+  const Index n_faces = static_cast<Index>(plan.joins.faces.rows());
+  Refinement result;
+  result.points.resize(n + n_edges + n_faces, 3);
+  result.points.topRows(n) = points;
+  for (Index i = 0; i < n_edges; ++i) {
+    const auto e = plan.joins.edges.row(i);
+    result.points.row(n + i) = 0.5 * (points.row(e[0]) + points.row(e[1]));
+  }
+  for (Index j = 0; j < n_faces; ++j) {
+    const auto f = plan.joins.faces.row(j);
+    result.points.row(n + n_edges + j) =
+        (points.row(f[0]) + points.row(f[1]) + points.row(f[2])) / 3;
+  }
+  std::vector<Tet> refined, pieces;
+  std::vector<Index> parents;
+  refined.reserve(tets.rows() + 2 * plan.splits.size());
+  parents.reserve(refined.capacity());
+  auto split = plan.splits.begin();
+  for (Index t = 0; t < tets.rows(); ++t) {
+    pieces.assign(1, tets.row(t));
+    for (; split != plan.splits.end() && split->tet == t; ++split) split_pieces(*split, pieces);
+    refined.insert(refined.end(), pieces.begin(), pieces.end());
+    parents.insert(parents.end(), pieces.size(), t);
+  }
+  result.tets = detail::as_rows<Tets>(refined);
+  result.parent_tet = detail::as_vector(parents);
+  result.joins = std::move(plan.joins);
+  return result;
+}
+
+}  // namespace stretchmap
