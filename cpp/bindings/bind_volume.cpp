@@ -53,10 +53,11 @@ void bind_volume(py::module_& m) {
       py::arg("tets").noconvert(), py::arg("fixed").noconvert(), py::arg("geometry").noconvert(),
       py::arg("coef"), py::arg("x").noconvert(), "L_II and -L_IB x_B as one pair, for checks.");
   py::class_<EnergyWeights>(m, "EnergyWeights")
-      .def(py::init([](double shape, double volume, double epsilon) {
-             return EnergyWeights{shape, volume, epsilon};
+      .def(py::init([](double shape, double volume, double epsilon, double face) {
+             return EnergyWeights{shape, volume, epsilon, face};
            }),
-           py::arg("shape"), py::arg("volume"), py::arg("epsilon") = 0.0)
+           py::arg("shape"), py::arg("volume"), py::arg("epsilon") = 0.0, py::arg("face") = 0.0)
+      .def_readonly("face", &EnergyWeights::face)
       .def_readonly("shape", &EnergyWeights::shape)
       .def_readonly("volume", &EnergyWeights::volume)
       .def_readonly("epsilon", &EnergyWeights::epsilon);
@@ -71,16 +72,21 @@ void bind_volume(py::module_& m) {
       .def_readonly("gradient_norm", &NewtonReport::gradient_norm)
       .def_readonly("alpha", &NewtonReport::alpha)
       .def_readonly("cg_iterations", &NewtonReport::cg_iterations)
+      .def_readonly("negative_curvature", &NewtonReport::negative_curvature)
       .def_readonly("cg_residual", &NewtonReport::cg_residual);
 
   py::class_<SolidNewton>(m, "SolidNewton")
-      .def(py::init([](const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
-                       const FlagsRef& motion, double R, double r, const PointsRef& x) {
-             return SolidNewton(SolidEnergy(tets, rest, weights, motion, R, r, x));
-           }),
-           py::arg("tets").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
-           py::arg("motion").noconvert(), py::arg("R"), py::arg("r"), py::arg("x").noconvert(),
-           release_gil())
+      .def(
+          py::init([](const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
+                      const FlagsRef& motion, double R, double r, const PointsRef& x,
+                      const FacesRef& faces, const RowsRef& face_rest, const VecRef& face_weights) {
+            return SolidNewton(SolidEnergy(tets, rest, weights, motion, R, r, x,
+                                           BoundaryBarrier(faces, face_rest, face_weights, R, r)));
+          }),
+          py::arg("tets").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
+          py::arg("motion").noconvert(), py::arg("R"), py::arg("r"), py::arg("x").noconvert(),
+          py::arg("faces").noconvert(), py::arg("face_rest").noconvert(),
+          py::arg("face_weights").noconvert(), release_gil())
       .def(
           "value",
           [](const SolidNewton& self, const PointsRef& x, const EnergyWeights& w) {
@@ -108,6 +114,17 @@ void bind_volume(py::module_& m) {
         return std::make_tuple(value, P, H);
       },
       py::arg("J"), py::arg("weights"), "Energy, gradient and projected Hessian of one tet.");
+  m.def("rest_triangles", &rest_triangles, py::arg("V").noconvert(), py::arg("faces").noconvert(),
+        py::arg("scale"), release_gil());
+  m.def(
+      "face_energy",
+      [](const Eigen::Matrix2d& K) {
+        Eigen::Matrix2d P;
+        Matrix4 H;
+        const double value = face_energy(K, P, H);
+        return std::make_tuple(value, P, H);
+      },
+      py::arg("K"), "Energy, gradient and projected Hessian of one boundary triangle.");
   m.def("rest_matrices", &rest_matrices, py::arg("V").noconvert(), py::arg("tets").noconvert(),
         py::arg("max_aspect"), release_gil());
   m.def("signed_tet_volumes", &signed_tet_volumes, py::arg("x").noconvert(),

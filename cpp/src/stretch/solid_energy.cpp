@@ -68,8 +68,9 @@ double first_root(double d0, double d1, double d2, double d3, double limit) {
 }  // namespace
 
 SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
-                         const FlagsRef& motion, double R, double r, const PointsRef& x)
-    : motion_(motion), R_(R), r_(r) {
+                         const FlagsRef& motion, double R, double r, const PointsRef& x,
+                         BoundaryBarrier barrier)
+    : motion_(motion), R_(R), r_(r), barrier_(std::move(barrier)) {
   const Index n = static_cast<Index>(motion.size()), k = static_cast<Index>(tets.rows());
   const RowVector3d low = x.colwise().minCoeff();
   const double size = std::max((x.colwise().maxCoeff() - low).maxCoeff(), 1e-300);
@@ -141,13 +142,9 @@ void SolidEnergy::build_pattern() {
     for (int a = 0; a < 4; ++a) {
       const Index row = vertex_row_[tets_(t, a)];
       if (row < 0) continue;
-      const Index* first = col_.data() + row_ptr_[row];
-      const Index* last = col_.data() + row_ptr_[row + 1];
       for (int b = 0; b < 4; ++b) {
         const Index other = vertex_row_[tets_(t, b)];
-        if (other >= 0)
-          slot_(t, 4 * a + b) =
-              static_cast<Index>(std::lower_bound(first, last, other) - col_.data());
+        if (other >= 0) slot_(t, 4 * a + b) = find_block(row, other);
       }
     }
   }
@@ -156,17 +153,28 @@ void SolidEnergy::build_pattern() {
   part_row_.resize(parts + 1);
   for (Index p = 0; p <= parts; ++p)
     part_row_[p] = static_cast<Index>(static_cast<std::int64_t>(n_rows) * p / parts);
-  part_tets_.assign(parts, {});
-  for (Index t = 0; t < k; ++t) {
-    for (Index p = 0; p < parts; ++p) {
-      bool touches = false;
-      for (int a = 0; a < 4; ++a) {
-        const Index row = vertex_row_[tets_(t, a)];
-        touches = touches || (row >= part_row_[p] && row < part_row_[p + 1]);
+  const auto touching = [&](const auto& elements, int corners) {
+    std::vector<std::vector<Index>> lists(parts);
+    for (Index t = 0; t < elements.rows(); ++t) {
+      for (Index p = 0; p < parts; ++p) {
+        bool touches = false;
+        for (int a = 0; a < corners; ++a) {
+          const Index row = vertex_row_[elements(t, a)];
+          touches = touches || (row >= part_row_[p] && row < part_row_[p + 1]);
+        }
+        if (touches) lists[p].push_back(t);
       }
-      if (touches) part_tets_[p].push_back(t);
     }
-  }
+    return lists;
+  };
+  part_tets_ = touching(tets_, 4);
+  part_faces_ = touching(barrier_.faces(), 3);
+}
+
+Index SolidEnergy::find_block(Index row, Index column) const {
+  const Index* first = col_.data() + row_ptr_[row];
+  const Index* last = col_.data() + row_ptr_[row + 1];
+  return static_cast<Index>(std::lower_bound(first, last, column) - col_.data());
 }
 
 BlockMatrix SolidEnergy::pattern() const {
@@ -196,6 +204,12 @@ EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) cons
   }
   EnergyReport report;
   report.energy = blocked_sum(energy);
+  if (w.face > 0.0 && barrier_.size() > 0) {
+    Vec face(barrier_.size());
+#pragma omp parallel for schedule(static)
+    for (Index f = 0; f < barrier_.size(); ++f) face[f] = barrier_.value(x, f);
+    report.energy += w.face * blocked_sum(face);
+  }
   report.min_det = k > 0 ? det.minCoeff() : 0.0;
   report.flips = static_cast<Index>((det.array() <= 0.0).count());
   return report;
@@ -243,10 +257,33 @@ void SolidEnergy::linearise(const PointsRef& x, const EnergyWeights& w, Points& 
     for (const Index t : part_tets_[p])
       add_element(x, w, t, part_row_[p], part_row_[p + 1], gradient, hessian.values.data());
   }
-  if ((motion_.array() == kGliding).any()) {
-    const Index n_rows = rows();
+  if ((motion_.array() != kGliding).all()) return;
+  const Index n_rows = rows();
 #pragma omp parallel for schedule(static)
-    for (Index row = 0; row < n_rows; ++row) into_frames(x, row, gradient, hessian.values.data());
+  for (Index row = 0; row < n_rows; ++row) into_frames(x, row, gradient, hessian.values.data());
+  if (w.face <= 0.0) return;
+#pragma omp parallel for schedule(static, 1)
+  for (Index p = 0; p < parts; ++p) {
+    for (const Index f : part_faces_[p])
+      add_face(x, w.face, f, part_row_[p], part_row_[p + 1], gradient, hessian.values.data());
+  }
+}
+
+// Adds the boundary triangle's share to the rows in [first, last), which are in frames already.
+void SolidEnergy::add_face(const PointsRef& x, double weight, Index f, Index first, Index last,
+                           Points& gradient, double* blocks) const {
+  Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
+  barrier_.linearise(x, f, g, H);
+  for (int a = 0; a < 3; ++a) {
+    const Index row = vertex_row_[barrier_.faces()(f, a)];
+    if (row < first || row >= last) continue;
+    gradient.row(row).head<2>() += weight * g.segment<2>(2 * a).transpose();
+    for (int b = 0; b < 3; ++b) {
+      const Index at = find_block(row, vertex_row_[barrier_.faces()(f, b)]);
+      Block(blocks + 9 * static_cast<std::ptrdiff_t>(at)).topLeftCorner<2, 2>() +=
+          weight * H.block<2, 2>(2 * a, 2 * b);
+    }
   }
 }
 

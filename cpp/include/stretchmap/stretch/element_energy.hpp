@@ -17,6 +17,7 @@ struct EnergyWeights {
   double shape = 1.0;
   double volume = 1.0;
   double epsilon = 0.0;  // 0: barrier; the energy is infinite on inverted tets
+  double face = 0.0;     // of the boundary triangles, where the boundary glides
 };
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
@@ -30,5 +31,15 @@ double element_energy(const Eigen::Matrix3d& J, const EnergyWeights& w);
 // \pre element_energy(J, w) is finite.
 double element_energy(const Eigen::Matrix3d& J, const EnergyWeights& w, Eigen::Matrix3d& P,
                       Matrix9* H);
+
+using Matrix4 = Eigen::Matrix<double, 4, 4>;
+
+// The same idea for a boundary triangle in a flat chart,
+//   phi(K) = tr(K^T K) / (2 det K) - 1 + (det K + 1 / det K) / 2 - 1,
+// a barrier against folding: +infinity when det K <= 0.
+double face_energy(const Eigen::Matrix2d& K);
+
+// Value, gradient and projected Hessian with respect to vec(K). \pre det K > 0.
+double face_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H);
 
 }  // namespace stretchmap

@@ -1,6 +1,7 @@
 // The distortion energy of a whole solid map, its gradient and its positive semi-definite Hessian.
 //
-//   Psi(x) = sum_t weight_t psi(J_t),   J_t = [x1 - x0, x2 - x0, x3 - x0] * rest_t
+//   Psi(x) = sum_t weight_t psi(J_t) + face * (energy of the gliding boundary triangles),
+//   J_t    = [x1 - x0, x2 - x0, x3 - x0] * rest_t,
 //
 // with psi of element_energy.hpp. Each vertex is free, fixed, or glides on the torus. A gliding
 // vertex has two unknowns, arc length along the two coordinate circles through it; its block is
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "stretchmap/linalg/block_solver.hpp"
+#include "stretchmap/stretch/boundary_barrier.hpp"
 #include "stretchmap/stretch/element_energy.hpp"
 #include "stretchmap/stretch/tet_laplacian.hpp"
 
@@ -21,17 +23,19 @@ namespace stretchmap {
 enum Motion : std::uint8_t { kFree = 0, kFixed = 1, kGliding = 2 };
 
 struct EnergyReport {
-  double energy = 0.0;  // +infinity if some tet is inverted and epsilon = 0
+  double energy = 0.0;  // +infinity if epsilon = 0 and a tet is inverted, or a face is folded
   double min_det = 0.0;
   Index flips = 0;  // tets with det J <= 0
 };
 
 class SolidEnergy {
  public:
+  // barrier: faces whose vertices all glide; may be empty.
   // tets (k, 4), rest (k, 9) row-major 3x3 matrices, weights (k) > 0, motion (n) of Motion values,
   // R and r the radii of the torus (only used by gliding vertices), x (n, 3) to number rows by.
   SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
-              const FlagsRef& motion, double R, double r, const PointsRef& x);
+              const FlagsRef& motion, double R, double r, const PointsRef& x,
+              BoundaryBarrier barrier = {});
 
   Index rows() const { return static_cast<Index>(row_vertex_.size()); }
   BlockMatrix pattern() const;  // of the Hessian, values zero
@@ -57,8 +61,11 @@ class SolidEnergy {
   Eigen::Matrix3d frame(const PointsRef& x, Index vertex) const;
   Eigen::Matrix3d jacobian(const PointsRef& x, Index t) const;
   void build_pattern();
+  Index find_block(Index row, Index column) const;  // position in col_
   void add_element(const PointsRef& x, const EnergyWeights& w, Index t, Index first, Index last,
                    Points& gradient, double* blocks) const;
+  void add_face(const PointsRef& x, double weight, Index f, Index first, Index last,
+                Points& gradient, double* blocks) const;
   void into_frames(const PointsRef& x, Index row, Points& gradient, double* blocks) const;
 
   Tets tets_;  // sorted by lowest row
@@ -66,12 +73,14 @@ class SolidEnergy {
   Vec weights_;
   Flags motion_;
   double R_, r_;
+  BoundaryBarrier barrier_;
   IndexVec row_vertex_;          // vertex of each row
   IndexVec vertex_row_;          // row of each vertex, -1 if fixed
   IndexVec row_ptr_, col_;       // block pattern
   IndexRows slot_;               // (k, 16) block of each pair of a tet's vertices, -1 if none
   std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
-  std::vector<std::vector<Index>> part_tets_;  // tets that touch them, ascending
+  std::vector<std::vector<Index>> part_tets_;   // tets that touch them, ascending
+  std::vector<std::vector<Index>> part_faces_;  // and faces
 };
 
 }  // namespace stretchmap

@@ -21,6 +21,7 @@ struct NewtonReport {
   double alpha = 0.0;  // step length taken, 0 if no decrease was found
   int cg_iterations = 0;
   double cg_residual = 0.0;
+  bool negative_curvature = false;  // met by the conjugate gradients, which then stopped early
 };
 
 class SolidNewton {
@@ -36,6 +37,9 @@ class SolidNewton {
                     const Poll& poll = {});
 
  private:
+  void try_double_step(Points& x, const Points& start, const Points& direction,
+                       const EnergyWeights& w, NewtonReport& report) const;
+
   SolidEnergy energy_;
   std::unique_ptr<BlockSolver> solver_;
 };
