@@ -57,4 +57,4 @@ def torus(nu: int = 12, nv: int = 8) -> tuple[NDArray[np.float64], NDArray[np.in
     i, j = (u + 1) % nu, (v + 1) % nv
     p, q, r, s = u * nv + v, i * nv + v, i * nv + j, u * nv + j
     lower, upper = np.stack([p, q, r], -1), np.stack([p, r, s], -1)
-    return points, np.concatenate([lower, upper]).reshape(-1, 3).astype(np.int32)
+    return points, np.stack([lower, upper], axis=2).reshape(-1, 3).astype(np.int32)
