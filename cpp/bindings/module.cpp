@@ -9,6 +9,7 @@ void bind_volume(py::module_& m);
 void bind_linalg(py::module_& m);
 void bind_distortion(py::module_& m);
 void bind_area(py::module_& m);
+void bind_certificate(py::module_& m);
 }  // namespace stretchmap::bindings
 
 PYBIND11_MODULE(_core, m) {
@@ -32,4 +33,5 @@ PYBIND11_MODULE(_core, m) {
   bind_linalg(m);
   bind_distortion(m);
   bind_area(m);
+  bind_certificate(m);
 }

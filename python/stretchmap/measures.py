@@ -243,11 +243,22 @@ def _orientation(
         return np.sign(chart_areas(mesh.F, _vertex_array(angles, len(mesh.V), 2, "angles")))
     if torus is None:
         return None
-    corners = image[mesh.F]
-    u, v, _ = torus.coordinates(corners.mean(axis=1))
-    return np.sign(
-        np.einsum("ij,ij->i", torus.normal(u, v), _core.face_area_vectors(image, mesh.F))
-    )
+    return np.sign(outward_areas(image, mesh.F, torus))
+
+
+def outward_areas(
+    image: NDArray[np.float64], faces: NDArray[np.int32], torus: Torus
+) -> NDArray[np.float64]:
+    """(m,) area each face shows to the outside of the torus at its centroid, negative if flipped.
+
+    Parameters
+    ----------
+    image : ndarray, shape (n, 3)
+    faces : ndarray of int32, shape (m, 3)
+    torus : Torus
+    """
+    u, v, _ = torus.coordinates(image[faces].mean(axis=1))
+    return np.einsum("ij,ij->i", torus.normal(u, v), _core.face_area_vectors(image, faces))
 
 
 def chart_areas(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,8 +1,9 @@
 """What every result shares: iteration records, the table, JSON, and map files that come back.
 
-A map file is an ``.npz`` with ``V``, ``F`` or ``T``, ``image`` (n, 3), further named arrays, and
-``meta``, a JSON text of all scalars, the history and the versions. Every writer here writes to a
-temporary file first and renames it, so a failure leaves no file behind.
+A map file is an ``.npz`` with ``V``, ``F`` or ``T``, ``image`` (n, 3), ``torus`` (2,) with R and r
+where there is one, further named arrays, and ``meta``, a JSON text of all scalars, the history and
+the versions. Every writer here writes to a temporary file first and renames it, so a failure leaves
+no file behind.
 """
 
 from __future__ import annotations
@@ -217,6 +218,8 @@ class MapResult:
             "ring_ratios": self.distortion.ring_ratios,
             **self.extra_arrays(),
         }
+        if self.torus is not None:
+            arrays["torus"] = np.array([self.torus.R, self.torus.r])
         meta = json.dumps(self.to_dict(history=True), allow_nan=False)
         with atomic_path(path) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, meta=np.array(meta), **arrays)
@@ -302,12 +305,14 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
         raise FileFormatError(f"{path}: image has shape {image.shape}, V {V.shape}")
     solid = TetMesh(V, arrays.pop("T")) if "T" in arrays else None
     surface = TriMesh(V, arrays.pop("F")) if "F" in arrays else None
-    torus = meta.get("torus")
+    radii = arrays.pop("torus", None)
+    if radii is not None and radii.shape != (2,):
+        raise FileFormatError(f"{path}: torus must hold R and r, it has shape {radii.shape}")
     return LoadedMap(
         solid=solid,
         surface=surface,
         image=image,
-        torus=None if torus is None else Torus(torus["R"], torus["r"]),
+        torus=None if radii is None else Torus(*radii),
         arrays=arrays,
         meta=meta,
         history=tuple(_read_record(record) for record in meta.get("history", ())),
