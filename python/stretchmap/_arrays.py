@@ -137,4 +137,4 @@ def _check_shape(raw: NDArray[Any], name: str, width: int, what: str) -> None:
             hint = "; triangles belong into a TriMesh"
         raise ArrayError(expected + hint)
     if len(raw) == 0:
-        raise ArrayError(f"{name} is empty")
+        raise ArrayError(f"{name} is empty, there is no mesh without {what}")
