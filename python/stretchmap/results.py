@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FileFormatError
-from .torus import Torus
+from .torus import TWO_PI, Torus
 
 if TYPE_CHECKING:
     from .measures import Distortion
@@ -176,8 +176,10 @@ class MapResult:
         ----------
         path : path-like
             ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``: the source mesh with
-            ``image`` as point data and the ratios as cell data. ``.obj``, ``.ply`` and the other
-            formats of :func:`stretchmap.write`: the image of the surface.
+            ``image`` as point data and the ratios as cell data. ``.obj`` of a surface with angles:
+            the source with (u, v) in turns as texture coordinates. The other formats of
+            :func:`stretchmap.write` hold no arrays and get the image itself, of a solid where they
+            can hold one and of its surface where not.
 
         Raises
         ------
@@ -186,27 +188,30 @@ class MapResult:
         OSError
             If the file cannot be written.
         """
+        from . import io
+
         path = Path(path)
-        ratios = {"ratio": self.distortion.ratios}
-        if path.suffix.lower() == ".npz":
+        suffix = path.suffix.lower()
+        mesh, d = self.mesh, self.distortion
+        solid = hasattr(mesh, "T")
+        angles = getattr(self, "angles", None)
+        if suffix == ".npz":
             self._save_npz(path)
-        elif path.suffix.lower() in (".vtu", ".vtk"):
-            from .io import write
-
-            arrays = {"image": self.image, "ring_ratio": self.distortion.ring_ratios}
-            n = len(self.mesh.V)
-            arrays.update((k, a) for k, a in self.extra_arrays().items() if a.shape[:1] == (n,))
-            write(path, self.mesh, point_data=arrays, cell_data=ratios)
+        elif suffix in (".vtu", ".vtk", ".xdmf"):
+            arrays = {
+                name: array
+                for name, array in self.extra_arrays().items()
+                if array.shape[:1] == (len(mesh.V),) and array.ndim <= 2
+            }
+            arrays |= {"image": self.image, "ring_ratio": d.ring_ratios}
+            io.write(path, mesh, point_data=arrays, cell_data={"ratio": d.ratios})
+        elif suffix == ".obj" and not solid and angles is not None:
+            io.write(path, mesh, corner_uv=corner_turns(mesh.F, angles))
+        elif solid and suffix not in io.suffixes(solid=True):
+            surface = mesh.surface
+            io.write(path, type(surface)(self.image[mesh.boundary_vertices], surface.F))
         else:
-            from .io import write
-            from .mesh import TriMesh
-
-            mesh = self.mesh
-            if hasattr(mesh, "T"):
-                surface = mesh.surface
-                write(path, TriMesh(self.image[mesh.boundary_vertices], surface.F))
-            else:
-                write(path, TriMesh(self.image, mesh.F), cell_data=ratios)
+            io.write(path, type(mesh)(self.image, elements(mesh)), cell_data={"ratio": d.ratios})
 
     def _save_npz(self, path: Path) -> None:
         mesh = self.mesh
@@ -222,7 +227,7 @@ class MapResult:
             arrays["torus"] = np.array([self.torus.R, self.torus.r])
         meta = json.dumps(self.to_dict(history=True), allow_nan=False)
         with atomic_path(path) as temporary, open(temporary, "wb") as file:
-            np.savez_compressed(file, meta=np.array(meta), **arrays)
+            np.savez(file, meta=np.array(meta), **arrays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,6 +342,14 @@ def _read_meta(path: object, meta: NDArray[Any] | None) -> dict[str, Any]:
 def _read_record(record: dict[str, Any]) -> IterationRecord:
     names = [f.name for f in dataclasses.fields(IterationRecord)]
     return IterationRecord(**{k: NAN if record[k] is None else record[k] for k in names})
+
+
+def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3, 2) chart coordinates of the corners of each face in turns, each face in one piece."""
+    turns = angles[faces] / TWO_PI
+    first = turns[:, :1] % 1.0
+    step = turns - turns[:, :1]
+    return first + step - np.round(step)
 
 
 def elements(mesh: TriMesh | TetMesh) -> NDArray[np.int32]:
