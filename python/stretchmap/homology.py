@@ -283,11 +283,12 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
     lists, forms = _core.tree_cotree(top, _core.edge_lengths(top, surface.V))
     loops = [np.array(loop, dtype=np.int32) for loop in lists]
     wedge = np.rint(_core.wedge_matrix(top, forms.astype(float))).astype(np.int64)
+    intersection = integer_inverse(wedge).T
     harmonic = solve_harmonic(surface, forms)
 
     within = None if solid is None else _bounding_in(solid, surface, loops)
     try:
-        linking, inside, tunnel = _bounding_by_linking(surface, loops)
+        linking, inside, tunnel = _bounding_by_linking(surface, loops, intersection)
         if within is not None and not _same_lattice(inside, within):
             raise SelfIntersectionError("the linking numbers contradict the solid")
     except (SelfIntersectionError, SolverError) as error:
@@ -295,7 +296,6 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
             raise
         logger.warning("%s: the solid decides, loops that bound outside are left out", error)
         linking = tunnel = None
-    intersection = integer_inverse(wedge).T
     handle = inside if within is None else within
     # x G^-1 x is the extremal length of class x.
     handle = reduced_basis(handle, np.linalg.inv(harmonic.gram))
@@ -325,19 +325,24 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
 
 
 def _bounding_by_linking(
-    surface: TriMesh, loops: list[NDArray[np.int32]]
+    surface: TriMesh, loops: list[NDArray[np.int32]], intersection: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Linking matrix and bases of the classes that bound inside and outside.
 
-    A class bounds inside exactly when it links no loop that was pushed outward.
+    A class bounds inside exactly when it links no loop that was pushed outward. On an embedded
+    surface lk(a, b outward) - lk(b, a outward) is minus the intersection number of a and b, each
+    kind of class has rank g, and the two kinds meet in a unimodular matrix.
     """
     linking = np.rint(_core.linking_matrix(surface.topology, surface.V, loops)).astype(np.int64)
     inside, outside = integer_kernel(linking.T), integer_kernel(linking)
-    if not 2 * len(inside) == 2 * len(outside) == len(loops):
+    if not (
+        2 * len(inside) == 2 * len(outside) == len(loops)
+        and np.array_equal(linking.T - linking, intersection)
+        and abs(round(np.linalg.det(outside @ intersection @ inside.T))) == 1
+    ):
         raise SelfIntersectionError(
-            f"{len(inside)} independent loops bound inside and {len(outside)} outside, a surface "
-            f"of genus {len(loops) // 2} that does not cross itself has {len(loops) // 2} of each; "
-            "remove the self-intersections or give the solid"
+            f"the linking numbers of the {len(loops)} generators are not those of a surface of "
+            f"genus {len(loops) // 2} without self-intersections; remove these or give the solid"
         )
     return linking, inside, outside
 
