@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "multigrid.hpp"
+#include "ordering.hpp"
 #include "parallel.hpp"
 #include "pcg.hpp"
 #include "spmv.hpp"
@@ -36,7 +38,20 @@ Rows rigid_body_modes(const PointsRef& points) {
 struct BlockSolver::State {
   BlockMatrix A;
   BlockOptions options;
-  std::vector<Block> inverse;  // of the diagonal blocks
+  std::vector<Block> inverse;  // jacobi: of the diagonal blocks
+  Rows modes;                  // multigrid: three or six columns, zero in rows that do not exist
+  std::vector<Index> order;    // multigrid: order[new] = old
+  bool hierarchy = false;
+  Multigrid<3, 3> translations_only;
+  Multigrid<3, 6> rigid;
+
+  bool multigrid() const { return options.preconditioner == "multigrid"; }
+  void invert_diagonal();
+  void mask_modes();
+  template <class Hierarchy>
+  void factor(Hierarchy& multigrid);
+  PcgResult<1> solve(const double* b, double* x, const SolveOptions& solve_options,
+                     const Poll& poll);
 };
 
 BlockSolver::BlockSolver(BlockMatrix A, const RowsRef& near_nullspace, const BlockOptions& options)
@@ -50,6 +65,10 @@ BlockSolver::BlockSolver(BlockMatrix A, const RowsRef& near_nullspace, const Blo
                 "the near-nullspace must have three rows per vertex, 3 or 6 columns");
   state_->A = std::move(A);
   state_->options = options;
+  if (state_->multigrid()) {
+    state_->modes = near_nullspace;
+    state_->mask_modes();
+  }
   refactor();
 }
 
@@ -63,21 +82,36 @@ BlockSolver& BlockSolver::operator=(BlockSolver&&) noexcept = default;
 BlockMatrix& BlockSolver::matrix() { return state_->A; }
 const BlockMatrix& BlockSolver::matrix() const { return state_->A; }
 
-void BlockSolver::refactor() {
-  State& s = *state_;
-  const Index n = s.A.rows();
-  s.inverse.resize(static_cast<std::size_t>(n));
+// An unknown without any coupling takes no part in the modes.
+void BlockSolver::State::mask_modes() {
+  for (Index i = 0; i < A.rows(); ++i) {
+    bool coupled[3] = {false, false, false};
+    for (Index e = A.row_ptr[i]; e < A.row_ptr[i + 1]; ++e)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          coupled[r] =
+              coupled[r] || ((A.col[e] != i || r != c) &&
+                             A.values[9 * static_cast<Eigen::Index>(e) + 3 * r + c] != 0.0);
+    for (int r = 0; r < 3; ++r)
+      if (!coupled[r]) modes.row(3 * static_cast<Eigen::Index>(i) + r).setZero();
+  }
+}
+
+// The inverse diagonal blocks, which must be positive definite.
+void BlockSolver::State::invert_diagonal() {
+  const Index n = A.rows();
+  inverse.resize(static_cast<std::size_t>(n));
   std::vector<char> good(static_cast<std::size_t>(n), 0);
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      const Index* first = s.A.col.data() + s.A.row_ptr[i];
-      const Index* last = s.A.col.data() + s.A.row_ptr[i + 1];
+      const Index* first = A.col.data() + A.row_ptr[i];
+      const Index* last = A.col.data() + A.row_ptr[i + 1];
       const Index* found = std::lower_bound(first, last, i);
       if (found == last || *found != i) continue;
-      const Eigen::Map<const Block> block(s.A.values.data() + 9 * (found - s.A.col.data()));
+      const Eigen::Map<const Block> block(A.values.data() + 9 * (found - A.col.data()));
       const Eigen::LLT<Eigen::Matrix3d> llt(block);
       good[i] = block.allFinite() && llt.info() == Eigen::Success;
-      s.inverse[i] = llt.solve(Eigen::Matrix3d::Identity());
+      inverse[i] = llt.solve(Eigen::Matrix3d::Identity());
     }
   });
   std::vector<Index> bad;
@@ -90,24 +124,83 @@ void BlockSolver::refactor() {
                 std::move(bad));
 }
 
+template <class Hierarchy>
+void BlockSolver::State::factor(Hierarchy& multigrid) {
+  if (!hierarchy) {
+    order = breadth_first_order(A.rows(), A.row_ptr.data(), A.col.data());
+    multigrid.finest().set_pattern(A.rows(), A.row_ptr.data(), A.col.data(), order);
+  }
+  multigrid.finest().set_values(A.values.data());
+  if (hierarchy) {
+    multigrid.refresh();
+    return;
+  }
+  const Eigen::Index width = 3 * modes.cols();
+  std::vector<double> ordered(static_cast<std::size_t>(modes.size()));
+  for (std::size_t i = 0; i < order.size(); ++i)
+    std::copy_n(modes.data() + width * order[i], width, ordered.data() + width * i);
+  multigrid.setup(ordered);
+  modes.resize(0, modes.cols());
+  hierarchy = true;
+}
+
+void BlockSolver::refactor() {
+  State& s = *state_;
+  s.invert_diagonal();
+  if (!s.multigrid()) return;
+  if (s.modes.cols() == 3)
+    s.factor(s.translations_only);
+  else
+    s.factor(s.rigid);
+}
+
+// Everything here is in the numbering of `order`.
+PcgResult<1> BlockSolver::State::solve(const double* b, double* x,
+                                       const SolveOptions& solve_options, const Poll& poll) {
+  const Index n = A.rows();
+  PcgSystem system;
+  system.n = 3 * n;
+  const auto use = [&](auto& multigrid) {
+    system.apply = [&](const double* in, double* out) {
+      multigrid.finest().template multiply<1>(in, out);
+    };
+    system.precondition = [&](const double* in, double* out) {
+      multigrid.template precondition<1>(in, out);
+    };
+  };
+  if (!multigrid()) {
+    system.apply = [&](const double* in, double* out) { multiply(A, in, out); };
+    system.precondition = [&](const double* in, double* out) {
+      for_chunks(n, [&](Index begin, Index end) {
+        for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
+          Eigen::Map<Eigen::Vector3d>(out + 3 * i) =
+              inverse[i] * Eigen::Map<const Eigen::Vector3d>(in + 3 * i);
+      });
+    };
+  } else if (modes.cols() == 3) {
+    use(translations_only);
+  } else {
+    use(rigid);
+  }
+  return pcg<1>(system, b, x, solve_options, poll);
+}
+
 SolveReport BlockSolver::solve(const PointsRef& b, Eigen::Ref<Points> x,
                                const SolveOptions& options, const Poll& poll) {
   State& s = *state_;
   const Index n = s.A.rows();
   if (b.rows() != n || x.rows() != n)
     throw Error("SolverError", "right-hand side and solution must have a row per vertex");
-  const auto jacobi = [&](const double* in, double* out) {
-    for_chunks(n, [&](Index begin, Index end) {
-      for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
-        Eigen::Map<Eigen::Vector3d>(out + 3 * i) =
-            s.inverse[i] * Eigen::Map<const Eigen::Vector3d>(in + 3 * i);
-    });
-  };
-  const PcgSystem system{3 * n, [&](const double* in, double* out) { multiply(s.A, in, out); },
-                         jacobi};
-  const PcgResult<1> result = pcg<1>(system, b.data(), x.data(), options, poll);
+  const auto old_row = [&](Index i) { return s.order.empty() ? i : s.order[i]; };
+  Points ordered_b(n, 3), ordered_x(n, 3);
+  for (Index i = 0; i < n; ++i) {
+    ordered_b.row(i) = b.row(old_row(i));
+    ordered_x.row(i) = x.row(old_row(i));
+  }
+  const PcgResult<1> result = s.solve(ordered_b.data(), ordered_x.data(), options, poll);
   if (!result.finite)
     throw Error("SolverError", "a value that is not finite appeared while solving");
+  for (Index i = 0; i < n; ++i) x.row(old_row(i)) = ordered_x.row(i);
   SolveReport report;
   report.iterations = result.iterations;
   report.residual = Vec::Constant(1, result.residual[0]);

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <type_traits>
 
 namespace stretchmap::linalg {
 namespace {
@@ -14,27 +13,44 @@ using RowBlock = Eigen::Matrix<T, B, B, B == 1 ? Eigen::ColMajor : Eigen::RowMaj
 template <class T, int B>
 using ColBlock = Eigen::Matrix<T, B, B>;
 
-// sum -= block * x for column-major B x B blocks and K interleaved columns. With one column the
-// inner loop runs down the column of the block, else along the right-hand sides.
+// The numbers of one row, held in whole vector registers: either one block row (K = 1, lanes are
+// its B unknowns and padding) or K right-hand sides of one unknown (B = 1).
 template <int B, int K>
-inline void subtract(const float* block, const float* x, float* sum) {
-  if constexpr (K == 1) {
-    for (int c = 0; c < B; ++c)
-      for (int r = 0; r < B; ++r) sum[r] -= block[B * c + r] * x[c];
-  } else {
-    for (int c = 0; c < B; ++c)
-      for (int r = 0; r < B; ++r)
-        for (int k = 0; k < K; ++k) sum[K * r + k] -= block[B * c + r] * x[K * c + k];
-  }
-}
+struct RowSum {
+  static_assert(B == 1 || K == 1);
+  static constexpr int kUsed = B * K;
+  static constexpr int kLanes = kUsed <= 2 ? kUsed : (kUsed + 3) / 4 * 4;
+  using Lanes = Eigen::Array<float, kLanes, 1>;
+  Lanes sum;
 
-// out = block * in
-template <int B, int K>
-inline void apply(const float* block, const float* in, float* out) {
-  float sum[B * K] = {};
-  subtract<B, K>(block, in, sum);
-  for (int k = 0; k < B * K; ++k) out[k] = -sum[k];
-}
+  static Eigen::Map<const Lanes> lanes(const float* from) { return Eigen::Map<const Lanes>(from); }
+  void load(const float* from) {
+    sum.setZero();
+    for (int k = 0; k < kUsed; ++k) sum[k] = from[k];
+  }
+  void store(float* to) const {
+    for (int k = 0; k < kUsed; ++k) to[k] = sum[k];
+  }
+  // sum -= block * x; reads up to kPadding numbers beyond a column-major block.
+  void subtract(const float* block, const float* x) {
+    if constexpr (B == 1)
+      sum -= block[0] * lanes(x);
+    else
+      for (int c = 0; c < B; ++c) sum -= x[c] * lanes(block + B * c);
+  }
+  // sum = block * sum
+  void transform(const float* block) {
+    if constexpr (B == 1) {
+      sum *= block[0];
+    } else {
+      const Lanes in = sum;
+      sum = in[0] * lanes(block);
+      for (int c = 1; c < B; ++c) sum += in[c] * lanes(block + B * c);
+    }
+  }
+};
+
+constexpr size_t kPadding = 3;  // numbers a RowSum may read beyond the last block
 
 }  // namespace
 
@@ -91,7 +107,7 @@ template <int B>
 Index LevelMatrix<B>::set_values(const double* values) {
   constexpr size_t kSize = B * B;
   value.resize(kSize * col.size());
-  value_f.resize(kSize * col.size());
+  value_f.resize(kSize * col.size() + kPadding);
   diagonal.resize(kSize * n);
   for_chunks(n, [&](Index begin, Index end) {
     for (size_t e = start[begin]; e < static_cast<size_t>(start[end]); ++e) {
@@ -115,7 +131,7 @@ Index LevelMatrix<B>::set_values(const double* values) {
 template <int B>
 void LevelMatrix<B>::set_diagonals(std::vector<char>& bad) {
   constexpr size_t kSize = B * B;
-  inverse_f.resize(kSize * n);
+  inverse_f.resize(kSize * n + kPadding);
   for_chunks(n, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
       Eigen::Map<RowBlock<double, B>> block(diagonal.data() + kSize * i);
@@ -179,33 +195,34 @@ template <int B>
 template <int K>
 void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
   constexpr size_t kBlock = B * B, kRow = B * K;
-  const auto subtract_range = [&](Index from, Index to, float* sum) {
-    for (Index e = from; e < to; ++e)
-      subtract<B, K>(value_f.data() + kBlock * e, x + kRow * col[e], sum);
+  const auto subtract = [&](Index from, Index to, RowSum<B, K>& row) {
+    for (Index e = from; e < to; ++e) row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
   };
   for_chunks(
       n,
       [&](Index begin, Index end) {
         for (Index i = begin; i < end; ++i) {
-          float sum[kRow];
-          for (size_t k = 0; k < kRow; ++k) sum[k] = b[kRow * i + k];
-          subtract_range(lower[i], upper[i], sum);
-          apply<B, K>(inverse_f.data() + kBlock * i, sum, x + kRow * i);
+          RowSum<B, K> row;
+          row.load(b + kRow * i);
+          subtract(lower[i], upper[i], row);
+          row.transform(inverse_f.data() + kBlock * i);
+          row.store(x + kRow * i);
         }
       },
       chunk);
   // The sweep solved the earlier columns and the diagonal exactly; the rest is the residual.
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      float sum[kRow] = {};
+      RowSum<B, K> row;
+      row.sum.setZero();
       if (excess[i] > 0.0f) {
-        for (size_t k = 0; k < kRow; ++k) sum[k] = b[kRow * i + k];
-        subtract_range(lower[i], upper[i], sum);
-        for (size_t k = 0; k < kRow; ++k) sum[k] *= excess[i];
+        row.load(b + kRow * i);
+        subtract(lower[i], upper[i], row);
+        row.sum *= excess[i];
       }
-      subtract_range(start[i], lower[i], sum);
-      subtract_range(upper[i], start[i + 1], sum);
-      for (size_t k = 0; k < kRow; ++k) r[kRow * i + k] = sum[k];
+      subtract(start[i], lower[i], row);
+      subtract(upper[i], start[i + 1], row);
+      row.store(r + kRow * i);
     }
   });
 }
@@ -218,14 +235,16 @@ void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) co
       n,
       [&](Index begin, Index end) {
         for (Index i = end - 1; i >= begin; --i) {
-          float sum[kRow];
-          for (size_t k = 0; k < kRow; ++k) sum[k] = b[kRow * i + k];
+          RowSum<B, K> row, old;
+          row.load(b + kRow * i);
+          old.load(y + kRow * i);
           for (Index e = start[i]; e < upper[i]; ++e)
-            subtract<B, K>(value_f.data() + kBlock * e, y + kRow * col[e], sum);
+            row.subtract(value_f.data() + kBlock * e, y + kRow * col[e]);
           for (Index e = upper[i]; e < start[i + 1]; ++e)
-            subtract<B, K>(value_f.data() + kBlock * e, x + kRow * col[e], sum);
-          apply<B, K>(inverse_f.data() + kBlock * i, sum, x + kRow * i);
-          for (size_t k = 0; k < kRow; ++k) x[kRow * i + k] += excess[i] * y[kRow * i + k];
+            row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
+          row.transform(inverse_f.data() + kBlock * i);
+          row.sum += excess[i] * old.sum;
+          row.store(x + kRow * i);
         }
       },
       chunk);
@@ -233,17 +252,17 @@ void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) co
 
 template <int B>
 void LevelMatrix<B>::scaled_multiply(const float* x, float* y) const {
-  constexpr size_t kBlock = B * B;
+  constexpr size_t kBlock = B * B, kRow = B;
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      float sum[B] = {}, scaled[B];
+      RowSum<B, 1> row, self;
+      row.sum.setZero();
       for (Index e = start[i]; e < start[i + 1]; ++e)
-        subtract<B, 1>(value_f.data() + kBlock * e, x + static_cast<size_t>(B) * col[e], sum);
-      apply<B, 1>(inverse_f.data() + kBlock * i, sum, scaled);
-      for (int r = 0; r < B; ++r) {
-        const size_t at = static_cast<size_t>(B) * i + r;
-        y[at] = x[at] - scaled[r] / (1.0f - excess[i]);
-      }
+        row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
+      row.transform(inverse_f.data() + kBlock * i);
+      self.load(x + kRow * i);
+      row.sum = self.sum - row.sum / (1.0f - excess[i]);
+      row.store(y + kRow * i);
     }
   });
 }

@@ -60,8 +60,8 @@ void DenseInverse::apply(const float* b, float* x) const {
 template <int B, int K>
 void Level<B, K>::set_transfer(bool fresh) {
   if constexpr (B == 1) {
-    // The filtered matrix has no positive off-diagonal entry: its scaled spectrum ends at 2.
-    transfer.damping = 2.0 / 3.0;
+    // The filtered matrix has no positive off-diagonal entry: its scaled spectrum ends below 2.
+    transfer.damping = 0.75;
   } else {
     // The largest eigenvalue of D^-1 A by the power method, a little enlarged.
     const size_t size = static_cast<size_t>(B) * A.n;

@@ -19,7 +19,7 @@ inline Index chunk_count(Index n, Index size = kChunk) { return (n + size - 1) /
 template <class Body>
 void for_chunks(Index n, const Body& body, Index size = kChunk) {
   const Index chunks = chunk_count(n, size);
-#pragma omp parallel for schedule(static) if (chunks > 1)
+#pragma omp parallel for schedule(static) if (chunks > 3)
   for (Index c = 0; c < chunks; ++c) body(c * size, std::min(n, (c + 1) * size));
 }
 
@@ -27,7 +27,7 @@ void for_chunks(Index n, const Body& body, Index size = kChunk) {
 template <class Make, class Body>
 void for_chunks_with(Index n, const Make& make, const Body& body, Index size = kChunk) {
   const Index chunks = chunk_count(n, size);
-#pragma omp parallel if (chunks > 1)
+#pragma omp parallel if (chunks > 3)
   {
     auto workspace = make();
 #pragma omp for schedule(static)
@@ -40,7 +40,7 @@ template <int K, class Body>
 std::array<double, K> sum_chunks(Index n, const Body& body) {
   const Index chunks = chunk_count(n);
   std::vector<std::array<double, K>> partial(static_cast<std::size_t>(chunks));
-#pragma omp parallel for schedule(static) if (chunks > 1)
+#pragma omp parallel for schedule(static) if (chunks > 3)
   for (Index c = 0; c < chunks; ++c) {
     std::array<double, K> sums{};
     body(c * kChunk, std::min(n, (c + 1) * kChunk), sums);
