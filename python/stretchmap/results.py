@@ -12,11 +12,8 @@ import dataclasses
 import json
 import math
 import os
-import platform
-import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._output import atomic_path, plain, table, versions
 from .errors import FileFormatError
 from .torus import TWO_PI, Torus
 
@@ -31,7 +29,16 @@ if TYPE_CHECKING:
     from .measures import Distortion
     from .mesh import TetMesh, TriMesh
 
-__all__ = ["IterationRecord", "LoadedMap", "MapResult", "load_map", "versions"]
+__all__ = [
+    "IterationRecord",
+    "LoadedMap",
+    "MapResult",
+    "atomic_path",
+    "load_map",
+    "plain",
+    "table",
+    "versions",
+]
 
 NAN = math.nan
 
@@ -127,6 +134,7 @@ class MapResult:
             "ring_sd": d.ring_sd,
             "element_mad": d.element_mad,
             "element_sd": d.element_sd,
+            "element_abs_sd": d.element_abs_sd,
             "ratio_min": d.ratio_min,
             "ratio_max": d.ratio_max,
             "total_distortion": d.total_distortion,
@@ -355,70 +363,3 @@ def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArr
 def elements(mesh: TriMesh | TetMesh) -> NDArray[np.int32]:
     """``T`` of a tet mesh, ``F`` of a triangle mesh."""
     return mesh.T if hasattr(mesh, "T") else mesh.F
-
-
-def versions() -> dict[str, str]:
-    """Versions of stretchmap and of what it computes with."""
-    import scipy
-
-    from . import __version__
-
-    return {
-        "stretchmap": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-    }
-
-
-def plain(value: Any) -> Any:
-    """A copy made of what JSON knows: NumPy scalars and arrays converted, non-finite to None."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def table(rows: Mapping[str, Any]) -> str:
-    """Two aligned columns, one row per entry."""
-    width = max((len(name) for name in rows), default=0)
-    return "\n".join(f"{name.replace('_', ' '):<{width}}  {_cell(v)}" for name, v in rows.items())
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return format(value, ".6g") if isinstance(value, float) else str(value)
-
-
-@contextmanager
-def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary path beside ``path``, renamed to it at the end and removed on failure.
-
-    Parameters
-    ----------
-    path : path-like
-        Where the finished file goes; its suffix is kept.
-    """
-    path = Path(path)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise

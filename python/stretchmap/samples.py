@@ -1,28 +1,30 @@
 """Meshes of our own: solid tori by a structured sweep, closed surfaces, pairs to be registered.
 
-The sweeps need nothing but NumPy. A disk is triangulated in concentric rings, ring k with 6 k
-vertices; its copies along a closed curve span prisms, and every prism is cut into three tets along
-the diagonals that run from the lower to the higher vertex number of the disk, so that neighbours
-agree. Only :func:`tetrahedralise` needs an optional package.
+All but :func:`tetrahedralise` need nothing beyond NumPy.
 """
 
 from __future__ import annotations
 
-import importlib.util
-import json
 import math
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import MissingDependencyError, OptionError, SolverError
+from ._sweep import (
+    Array,
+    Embedding,
+    closed_frame,
+    disk_size,
+    least_distance_of_strands,
+    parameters,
+    resolution,
+    sweep,
+    swept,
+)
+from ._tetgen import tetrahedralise
+from .errors import OptionError
 from .mesh import TetMesh, TriMesh
 from .torus import TWO_PI, Torus
 
@@ -41,10 +43,6 @@ __all__ = [
     "vertebra_pair",
 ]
 
-Array = NDArray[np.float64]
-# Stations (m, 1) in turns and section points (1, p) in the unit disk -> points (m, p, 3).
-Embedding = Callable[[Array, Array, Array], Array]
-
 
 def solid_torus(n_tets: int = 20_000, R: float = 3.0, r: float = 1.0) -> TetMesh:
     """The standard solid torus.
@@ -62,7 +60,7 @@ def solid_torus(n_tets: int = 20_000, R: float = 3.0, r: float = 1.0) -> TetMesh
         If the radii do not make a torus or fewer than 300 tets are asked for.
     """
     torus = Torus(R, r)
-    return _swept(n_tets, TWO_PI * R / r, _revolved(torus, lambda u, v: 1.0 + 0.0 * u * v))
+    return swept(n_tets, TWO_PI * R / r, _revolved(torus, lambda u, v: 1.0 + 0.0 * u * v))
 
 
 def bumpy_torus(
@@ -94,7 +92,7 @@ def bumpy_torus(
     if not 0.0 <= amplitude < min(1.0, torus.ratio - 1.0):
         raise OptionError(f"amplitude must be in [0, min(1, R/r - 1)), got {amplitude}")
     a, b = waves
-    return _swept(
+    return swept(
         n_tets,
         TWO_PI * R / r,
         _revolved(torus, lambda u, v: 1.0 + amplitude * np.cos(a * u) * np.cos(b * v)),
@@ -144,8 +142,7 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
     Raises
     ------
     OptionError
-        If the tube does not fit (``radius`` at least 0.5 for the trefoil, less for others) or p, q
-        are not coprime.
+        If the tube would touch itself or p, q are not coprime; the message holds the largest radius.
     """
     if math.gcd(p, q) != 1:
         raise OptionError(f"({p}, {q}) is not a knot: the numbers must be coprime")
@@ -155,16 +152,16 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
 
     dense = curve(np.linspace(0.0, 1.0, 2001))
     length = float(np.linalg.norm(np.diff(dense, axis=0), axis=1).sum())
-    room = _least_distance_of_strands(dense[:-1:4], length)
+    room = least_distance_of_strands(dense[:-1:4], length)
     if not 0.0 < radius < 0.45 * room:
         raise OptionError(f"radius must be positive and below {0.45 * room:.3g}, got {radius}")
 
     def embed(turns: Array, x: Array, y: Array) -> Array:
         centres = curve(turns[:, 0])
-        e1, e2 = _closed_frame(centres)
+        e1, e2 = closed_frame(centres)
         return centres[:, None] + radius * (x[..., None] * e1[:, None] + y[..., None] * e2[:, None])
 
-    return _swept(n_tets, length / radius, embed)
+    return swept(n_tets, length / radius, embed)
 
 
 def vertebra_like(n_tets: int = 40_000, seed: int | None = None) -> TetMesh:
@@ -185,7 +182,7 @@ def vertebra_like(n_tets: int = 40_000, seed: int | None = None) -> TetMesh:
     OptionError
         If fewer than 300 tets are asked for.
     """
-    return _swept(n_tets, 22.0, _vertebra(seed))
+    return swept(n_tets, 22.0, _vertebra(seed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,15 +232,15 @@ def vertebra_pair(
     if not 0 <= n_landmarks <= stations * sixths:
         raise OptionError(f"n_landmarks must be from 0 to {stations * sixths}, got {n_landmarks}")
     individuals = [_vertebra(2 * seed), _vertebra(2 * seed + 1)]
-    sizes = [_resolution(count, 22.0, stations) for count in n_tets]
-    source, target = (_sweep(n, m, embed) for (n, m), embed in zip(sizes, individuals, strict=True))
+    sizes = [resolution(count, 22.0, stations) for count in n_tets]
+    source, target = (sweep(n, m, embed) for (n, m), embed in zip(sizes, individuals, strict=True))
     (n, m), _ = sizes
-    truth = individuals[1](*_parameters(n, m)).reshape(-1, 3)
+    truth = individuals[1](*parameters(n, m)).reshape(-1, 3)
 
     sites = np.sort(np.random.default_rng(seed).permutation(stations * sixths)[:n_landmarks])
     station, sixth = np.divmod(sites, sixths)
     ids = [
-        station * (m // stations) * _disk_size(n) + _disk_size(n - 1) + sixth * n for n, m in sizes
+        station * (m // stations) * disk_size(n) + disk_size(n - 1) + sixth * n for n, m in sizes
     ]
     return VertebraPair(source, target, truth, *ids)
 
@@ -293,145 +290,6 @@ def double_torus(n: int = 2) -> TriMesh:
     return solid_double_torus(n).surface
 
 
-def tetrahedralise(
-    surface: TriMesh, max_volume: float | None = None, quality: float = 1.4
-) -> TetMesh:
-    """Fill a closed surface with tets, the surface kept exactly as it is.
-
-    Parameters
-    ----------
-    surface : TriMesh
-        Closed, without self-intersections, faces outward, every vertex used. Its vertices are the
-        first of the result, in the same order; its faces are the boundary faces.
-    max_volume : float, optional
-        Largest tet volume aimed at; without it the size follows the surface.
-    quality : float
-        Largest ratio of circumradius to shortest edge aimed at, above 1. Near the surface both
-        aims may be missed, since the surface is not refined.
-
-    Raises
-    ------
-    MissingDependencyError
-        If the ``tetgen`` package is not installed.
-    OptionError
-        If ``max_volume`` or ``quality`` is out of range.
-    SolverError
-        If the surface cannot be filled, as when it crosses itself, or was changed.
-    """
-    if quality <= 1.0 or (max_volume is not None and max_volume <= 0.0):
-        raise OptionError("quality must be above 1 and max_volume positive")
-    if importlib.util.find_spec("tetgen") is None:
-        raise MissingDependencyError(
-            "filling a surface with tets needs tetgen: pip install 'stretchmap[mesh]'"
-        )
-    options: dict[str, Any] = {"minratio": quality}
-    if max_volume is not None:
-        options |= {"fixedvolume": True, "maxvolume": max_volume}
-    filled = _run_tetgen(surface, options)
-    solid = TetMesh(filled[0], filled[1], orient=True)
-    n = len(surface.V)
-    if not (
-        np.array_equal(solid.V[:n], surface.V)
-        and np.array_equal(solid.boundary_vertices, np.arange(n))
-        and len(solid.surface.F) == len(surface.F)
-    ):
-        raise SolverError("filling the surface with tets changed it")
-    return solid
-
-
-def _run_tetgen(surface: TriMesh, options: dict[str, Any]) -> tuple[Array, NDArray[np.int32]]:
-    """Points and tets; in a process of its own, since tetgen aborts the process on bad input."""
-    script = (
-        "import json, sys, numpy, tetgen\n"
-        "data = numpy.load('surface.npz')\n"
-        "filled = tetgen.TetGen(data['V'], data['F']).tetrahedralize(\n"
-        "    nobisect=True, quality=True, order=1, quiet=True, **json.loads(sys.argv[1]))\n"
-        "numpy.savez('solid.npz', V=filled[0], T=filled[1])\n"
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
-        run = subprocess.run(
-            [sys.executable, "-c", script, json.dumps(options)],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-        )
-        if run.returncode != 0:
-            raise SolverError(
-                "the surface cannot be filled with tets; it may cross itself "
-                f"({(run.stderr.strip().splitlines() or ['tetgen gave up'])[-1]})"
-            )
-        with np.load(Path(folder, "solid.npz")) as solid:
-            return solid["V"], solid["T"]
-
-
-def _swept(n_tets: int, slenderness: float, embed: Embedding) -> TetMesh:
-    """Sweep with about ``n_tets`` tets; slenderness is the length over the tube radius."""
-    return _sweep(*_resolution(n_tets, slenderness), embed)
-
-
-def _resolution(n_tets: int, slenderness: float, multiple: int = 1) -> tuple[int, int]:
-    """Rings n and stations m with 18 n^2 m close to n_tets and cells about as long as wide."""
-    if n_tets < 300:
-        raise OptionError(f"a sweep has at least 300 tets, got n_tets = {n_tets}")
-    n = max(1, round((n_tets / (18.0 * slenderness)) ** (1.0 / 3.0)))
-    m = max(1, round(n_tets / (18.0 * n * n * multiple))) * multiple
-    return n, max(m, 6)
-
-
-def _disk_size(n: int) -> int:
-    """Vertices of the disk with n rings."""
-    return 1 + 3 * n * (n + 1)
-
-
-def _disk(n: int) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Unit disk in n rings: coordinates x, y (p,) and triangles (6 n^2, 3), counter-clockwise."""
-    ring = np.repeat(np.arange(n + 1), [1, *(6 * k for k in range(1, n + 1))])
-    first = np.array([_disk_size(k - 1) if k else 0 for k in range(n + 1)])
-    angle = TWO_PI * (np.arange(_disk_size(n)) - first[ring]) / np.maximum(6 * ring, 1)
-    x, y = ring / n * np.cos(angle), ring / n * np.sin(angle)
-
-    triangles = []
-    for k in range(1, n + 1):
-        sector, step = (index.ravel() for index in np.indices((6, k)))
-        outer = first[k] + sector * k + step
-        outer_next = first[k] + (sector * k + step + 1) % (6 * k)
-        inner_count = max(6 * (k - 1), 1)
-        inner = first[k - 1] + (sector * (k - 1) + step) % inner_count
-        inner_next = first[k - 1] + (sector * (k - 1) + step + 1) % inner_count
-        triangles.append(np.stack([inner, outer, outer_next], axis=1))
-        between = step < k - 1
-        triangles.append(np.stack([inner, outer_next, inner_next], axis=1)[between])
-    return x, y, np.concatenate(triangles).astype(np.int32)
-
-
-def _parameters(n: int, m: int) -> tuple[Array, Array, Array]:
-    x, y, _ = _disk(n)
-    return np.arange(m)[:, None] / m, x[None], y[None]
-
-
-def _sweep(n: int, m: int, embed: Embedding) -> TetMesh:
-    """Disk with n rings swept through m stations of a closed curve."""
-    x, y, triangles = _disk(n)
-    p = len(x)
-    V = embed(np.arange(m)[:, None] / m, x[None], y[None]).reshape(-1, 3)
-    low = np.sort(triangles, axis=1)
-    odd = np.argmax(triangles == low[:, :1], axis=1)  # an even turn brings the lowest id first
-    odd = np.take_along_axis(triangles, (odd[:, None] + 1) % 3, axis=1)[:, 0] != low[:, 1]
-    a, b, c = (low[None, :, k] + p * np.arange(m, dtype=np.int32)[:, None] for k in range(3))
-    a1, b1, c1 = (
-        low[None, :, k] + p * ((np.arange(m, dtype=np.int32)[:, None] + 1) % m) for k in range(3)
-    )
-    T = np.stack([a, b, c, c1, a, b, b1, c1, a, a1, b1, c1], axis=-1).reshape(m, -1, 3, 4)
-    # (a, b, c, c1) and (a, a1, b1, c1) have one sign, (a, b, b1, c1) the other.
-    turn = np.stack([odd, ~odd, odd], axis=1)
-    first = V[T[0, 0, 0, 1:]] - V[T[0, 0, 0, 0]]
-    if (np.linalg.det(first) < 0.0) != turn[0, 0]:
-        turn = ~turn
-    T = np.where(turn[None, :, :, None], T[..., [0, 1, 3, 2]], T)
-    return TetMesh(V, T.reshape(-1, 4))
-
-
 def _revolved(torus: Torus, scale: Callable[[Array, Array], Array]) -> Embedding:
     """Section scaled about the centre circle of a torus by a function of (u, v)."""
 
@@ -440,48 +298,6 @@ def _revolved(torus: Torus, scale: Callable[[Array, Array], Array]) -> Embedding
         return torus.xi(u, v, torus.r * np.hypot(x, y) * scale(u, v))
 
     return embed
-
-
-def _least_distance_of_strands(points: Array, length: float) -> float:
-    """Least distance of points of a closed curve that are far apart along it."""
-    n = len(points)
-    apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
-    apart = np.minimum(apart, n - apart) * (length / n)
-    distance = np.linalg.norm(points[:, None] - points[None], axis=-1)
-    return float(distance[apart > 2.0 * distance].min(initial=math.inf))
-
-
-def _closed_frame(centres: Array) -> tuple[Array, Array]:
-    """Normals (m, 3), (m, 3) along a closed polygon, turning as little as possible.
-
-    Double reflection carries the frame from station to station (Wang et al. 2008); what is missing
-    after one round is spread evenly.
-    """
-    m = len(centres)
-    tangent = np.roll(centres, -1, axis=0) - np.roll(centres, 1, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    normal = np.empty_like(centres)
-    start = np.eye(3)[np.argmin(np.abs(tangent[0]))]
-    start = start - (start @ tangent[0]) * tangent[0]
-    current = start / np.linalg.norm(start)
-    for i in range(m):
-        normal[i] = current
-        k = (i + 1) % m
-        chord = centres[k] - centres[i]
-        chord /= np.linalg.norm(chord)
-        current = current - 2.0 * (chord @ current) * chord
-        carried = tangent[i] - 2.0 * (chord @ tangent[i]) * chord
-        mirror = tangent[k] - carried
-        length = mirror @ mirror
-        if length > 0.0:
-            current = current - 2.0 / length * (mirror @ current) * mirror
-    binormal = np.cross(tangent, normal)
-    missing = math.atan2(current @ binormal[0], current @ normal[0])
-    angle = -missing * np.arange(m)[:, None] / m
-    return (
-        np.cos(angle) * normal + np.sin(angle) * binormal,
-        np.cos(angle) * binormal - np.sin(angle) * normal,
-    )
 
 
 def _bump(angle: Array, centre: float, width: float) -> Array:

@@ -1,0 +1,81 @@
+"""Small things every output needs: tables, JSON-ready values, versions, files that appear whole."""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def versions() -> dict[str, str]:
+    """Versions of stretchmap and of what it computes with."""
+    import scipy
+
+    from . import __version__
+
+    return {
+        "stretchmap": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+    }
+
+
+def plain(value: Any) -> Any:
+    """A copy made of what JSON knows: NumPy scalars and arrays converted, non-finite to None."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def table(rows: Mapping[str, Any]) -> str:
+    """Two aligned columns, one row per entry."""
+    width = max((len(name) for name in rows), default=0)
+    return "\n".join(f"{name.replace('_', ' '):<{width}}  {_cell(v)}" for name, v in rows.items())
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return format(value, ".6g") if isinstance(value, float) else str(value)
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary path beside ``path``, renamed to it at the end and removed on failure.
+
+    Parameters
+    ----------
+    path : path-like
+        Where the finished file goes; its suffix is kept.
+    """
+    path = Path(path)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
