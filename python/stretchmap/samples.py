@@ -142,7 +142,8 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
     Raises
     ------
     OptionError
-        If the tube would touch itself or p, q are not coprime; the message holds the largest radius.
+        If p, q are not coprime or the tube would touch itself; the message names the largest
+        radius.
     """
     if math.gcd(p, q) != 1:
         raise OptionError(f"({p}, {q}) is not a knot: the numbers must be coprime")

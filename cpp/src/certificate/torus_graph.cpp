@@ -49,11 +49,13 @@ FaceOnTorus examine(const std::array<Vec3, 3>& x, double R) {
   const double towards = std::atan2(cross(middle, n_flat), middle.dot(n_flat));
   if (towards > low - 1e-9 && towards < high + 1e-9) reach = n_flat.norm();
 
-  // Rounding: with unit u = 2^-53 the computed normal is off by less than 9 u |e1| |e2|, so n . x
-  // by less than 12 u |e1| |e2| |x| and R n . c / |c| by less than 16 u |e1| |e2| R.
+  // Rounding: with the unit u = 2^-53 the computed normal is off by less than 9 u |e1| |e2|, hence
+  // n . x by less than 12 u |e1| |e2| |x| and `reach` by less than 16 u |e1| |e2|, to which comes
+  // at most 27 u |e1| |e2| where n_flat is so short that its direction is lost. Together below 64
+  // u.
   const double size = std::max({x[0].norm(), x[1].norm(), x[2].norm()}) + R;
   const double bound =
-      16.0 * std::numeric_limits<double>::epsilon() * e1.norm() * e2.norm() * size + 1e-300;
+      32.0 * std::numeric_limits<double>::epsilon() * e1.norm() * e2.norm() * size + 1e-300;
   out.proven = n.dot(x[0]) - R * reach > bound;
 
   // v lies within a quarter turn of the normal's own direction in the half-plane of u, which turns
