@@ -1,7 +1,6 @@
 #include "arrays.hpp"
 #include "stretchmap/mesh/boundary_joins.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
-#include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/orient.hpp"
 #include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
@@ -9,16 +8,6 @@
 
 namespace stretchmap::bindings {
 namespace {
-
-IndexVec misoriented_faces(const PointsRef& points, const FacesRef& faces) {
-  const FacetGroups groups = group_half_edges(faces, static_cast<Index>(points.rows()));
-  return set_entries(faces_to_turn(points, faces, face_patches(faces, groups)));
-}
-
-IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets) {
-  const FacetGroups groups = group_half_faces(tets, static_cast<Index>(points.rows()));
-  return set_entries(tets_to_turn(points, tets, tet_patches(tets, groups)));
-}
 
 void bind_topology(py::module_& m) {
   py::class_<SurfaceTopology>(m, "SurfaceTopology")

@@ -120,6 +120,8 @@ def boundary_joins(solid: TetMesh) -> BoundaryJoins:
     ------
     NonManifoldError
         A face shared by more than two tets; ``ids`` are the tets.
+    DegenerateError
+        Tets that repeat a vertex; ``ids`` are the tets.
     """
     found = _core.BoundaryJoins(solid.T, solid.n_vertices)
     return BoundaryJoins(found.edges, found.faces, found.tets)
@@ -146,6 +148,8 @@ def refine_boundary_joins(solid: TetMesh) -> Refinement:
     ------
     NonManifoldError
         A face shared by more than two tets; ``ids`` are the tets.
+    DegenerateError
+        Tets that repeat a vertex; ``ids`` are the tets.
     """
     found = _core.Refinement(solid.V, solid.T)
     joins = found.joins

@@ -23,6 +23,7 @@ import numpy as np
 import shapes
 import stretchmap
 from stretchmap import TetMesh, TriMesh, errors
+from stretchmap.refine import refine_boundary_joins
 
 DEPTHS = ("arrays", "closed", "torus")
 
@@ -318,6 +319,11 @@ def every_property(mesh: Any) -> None:
             assert str(error)
 
 
+def homology_of(mesh: TetMesh) -> Any:
+    """Homology of the boundary with labels from inside."""
+    return stretchmap.homology_basis(mesh.surface, mesh)
+
+
 ENTRIES = [
     Entry("TriMesh", "surface", "arrays", TriMesh),
     Entry("TriMesh orient", "surface", "arrays", lambda V, F: TriMesh(V, F, orient=True)),
@@ -350,6 +356,36 @@ ENTRIES = [
     ),
     Entry(
         "conformal_map", "surface", "torus", lambda V, F: stretchmap.conformal_map(TriMesh(V, F))
+    ),
+    Entry(
+        "area_map",
+        "surface",
+        "torus",
+        lambda V, F: stretchmap.area_map(TriMesh(V, F), phase=0.0, sem_iter=2),
+    ),
+    Entry(
+        "distortion of a surface",
+        "surface",
+        "arrays",
+        lambda V, F: stretchmap.distortion(TriMesh(V, F), 2 * TriMesh(V, F).V),
+    ),
+    Entry(
+        "distortion of a solid",
+        "solid",
+        "arrays",
+        lambda V, T: stretchmap.distortion(TetMesh(V, T), 2 * TetMesh(V, T).V),
+    ),
+    Entry(
+        "refine_boundary_joins",
+        "solid",
+        "arrays",
+        lambda V, T: refine_boundary_joins(TetMesh(V, T)),
+    ),
+    Entry(
+        "homology_basis of a solid",
+        "solid",
+        "arrays",
+        lambda V, T: homology_of(TetMesh(V, T)),
     ),
 ]
 

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "diagnosis_common.hpp"
+#include "stretchmap/base/errors.hpp"
 #include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
 
@@ -50,6 +52,13 @@ std::vector<std::uint64_t> boundary_edges(const TetBoundary& boundary) {
 }
 
 Plan plan_splits(const TetsRef& tets, Index n_vertices) {
+  const IndexVec repeated = set_entries(detail::repeating(tets));
+  if (repeated.size() > 0) {
+    throw Error("DegenerateError",
+                std::to_string(repeated.size()) + " tets repeat a vertex, the first is tet " +
+                    std::to_string(repeated[0]) + "; remove them",
+                {repeated.begin(), repeated.end()});
+  }
   const TetBoundary boundary = tet_boundary(tets, n_vertices);
   const auto outside = [&](Index v) { return boundary.index[v] >= 0; };
   const std::vector<std::uint64_t> rim = boundary_edges(boundary);

@@ -118,15 +118,10 @@ void topology(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& 
 SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets) {
   const Index n_vertices = static_cast<Index>(points.rows());
   SolidDiagnosis report;
-  Mask skip = detail::repeating(tets);
-  report.repeated = set_entries(skip);
-  Mask copies =
-      detail::later_members(group_equal_tets(tets, n_vertices), static_cast<Index>(tets.rows()));
-  for (std::size_t t = 0; t < skip.size(); ++t) {
-    if (skip[t]) copies[t] = 0;
-    skip[t] |= copies[t];
-  }
-  report.duplicates = set_entries(copies);
+  const detail::LeftOut out = detail::left_out(tets, group_equal_tets(tets, n_vertices));
+  const Mask& skip = out.either;
+  report.repeated = set_entries(out.repeated);
+  report.duplicates = set_entries(out.copies);
 
   const FacetGroups faces = group_half_faces(tets, n_vertices, skip);
   const FacetGroups edges = group_tet_edges(tets, n_vertices, skip);

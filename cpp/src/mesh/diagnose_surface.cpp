@@ -95,18 +95,15 @@ void topology(const FacesRef& faces, const FacetGroups& groups, const Mask& skip
 SurfaceDiagnosis diagnose_surface(const PointsRef& points, const FacesRef& faces) {
   const Index n_vertices = static_cast<Index>(points.rows());
   SurfaceDiagnosis report;
-  Mask skip = detail::repeating(faces);
-  report.repeated = set_entries(skip);
-  Mask copies =
-      detail::later_members(group_equal_faces(faces, n_vertices), static_cast<Index>(faces.rows()));
+  const detail::LeftOut out = detail::left_out(faces, group_equal_faces(faces, n_vertices));
+  const Mask& skip = out.either;
   const auto flat = degenerate_faces(points, faces);
   Mask no_area(skip.size(), 0);
   for (std::size_t f = 0; f < skip.size(); ++f) {
-    if (skip[f]) copies[f] = 0;
-    skip[f] |= copies[f];
     no_area[f] = !skip[f] && flat[static_cast<Index>(f)];
   }
-  report.duplicates = set_entries(copies);
+  report.repeated = set_entries(out.repeated);
+  report.duplicates = set_entries(out.copies);
   report.degenerate = set_entries(no_area);
 
   const FacetGroups groups = group_half_edges(faces, n_vertices, skip);

@@ -1,4 +1,4 @@
-// Shared by the two diagnoses.
+// Shared by the two diagnoses and by what repairs.
 #pragma once
 
 #include <algorithm>
@@ -28,6 +28,24 @@ inline Mask later_members(const FacetGroups& groups, Index n) {
     for (Index p = groups.start[g] + 1; p < groups.start[g + 1]; ++p) mask[groups.order[p]] = 1;
   }
   return mask;
+}
+
+// Elements that no check looks at: those that repeat a vertex, and later copies.
+struct LeftOut {
+  Mask repeated, copies, either;
+};
+
+template <class Elements>
+LeftOut left_out(const Elements& elements, const FacetGroups& equal) {
+  LeftOut out;
+  out.repeated = repeating(elements);
+  out.copies = later_members(equal, static_cast<Index>(elements.rows()));
+  out.either = out.repeated;
+  for (std::size_t e = 0; e < out.either.size(); ++e) {
+    if (out.repeated[e]) out.copies[e] = 0;
+    out.either[e] |= out.copies[e];
+  }
+  return out;
 }
 
 inline IndexVec negative_entries(const IndexVec& values) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "diagnosis_common.hpp"
 #include "stretchmap/mesh/size.hpp"
 
 namespace stretchmap {
@@ -130,6 +131,20 @@ Mask tets_to_turn(const PointsRef& points, const TetsRef& tets, const Patches& p
     if (p >= 0) votes[p] += patches.turned[t] ? -volumes[t] : volumes[t];
   }
   return turn_patches(patches, votes);
+}
+
+IndexVec misoriented_faces(const PointsRef& points, const FacesRef& faces) {
+  const Index n = static_cast<Index>(points.rows());
+  const Mask skip = detail::left_out(faces, group_equal_faces(faces, n)).either;
+  const Patches patches = face_patches(faces, group_half_edges(faces, n, skip), skip);
+  return set_entries(faces_to_turn(points, faces, patches));
+}
+
+IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets) {
+  const Index n = static_cast<Index>(points.rows());
+  const Mask skip = detail::left_out(tets, group_equal_tets(tets, n)).either;
+  const Patches patches = tet_patches(tets, group_half_faces(tets, n, skip), skip);
+  return set_entries(tets_to_turn(points, tets, patches));
 }
 
 IndexVec set_entries(const Mask& mask) {

@@ -25,7 +25,8 @@ struct Refinement {
   BoundaryJoins joins;  // what was split: vertex n + i halves edge i, n + a + j is in face j
 };
 
-// \throws Error "NonManifoldError" for a face shared by more than two tets.
+// \throws Error "NonManifoldError" for a face shared by more than two tets, "DegenerateError" for
+//         tets that repeat a vertex; ids: the tets.
 BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices);
 
 // Orientation and total volume are kept. A tet that is its own component, with all its faces on the

@@ -31,6 +31,11 @@ Patches tet_patches(const TetsRef& tets, const FacetGroups& half_faces, const Ma
 Mask faces_to_turn(const PointsRef& points, const FacesRef& faces, const Patches& patches);
 Mask tets_to_turn(const PointsRef& points, const TetsRef& tets, const Patches& patches);
 
+// The same for a whole mesh, as ids. Elements that repeat a vertex and second copies of an element
+// take no part and are never turned.
+IndexVec misoriented_faces(const PointsRef& points, const FacesRef& faces);
+IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets);
+
 // Indices of all set entries.
 IndexVec set_entries(const Mask& mask);
 
