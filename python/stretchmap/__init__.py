@@ -22,6 +22,8 @@ _EXPORTS = {
     "volume_map": "volume",
     "distortion": "measures",
     "certify": "certificate",
+    "certify_file": "certificate",
+    "load_map": "results",
 }
 _MODULES = {"errors", "samples", "plot"}
 
