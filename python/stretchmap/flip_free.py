@@ -1,0 +1,221 @@
+"""Flip-free minimisation of volume distortion: untangle, minimise, let the boundary glide.
+
+All stages minimise the energy of ``element_energy.hpp`` by projected Newton steps; they differ in
+its weights and in which vertices move. With lambda the weight of the volume term and 1 that of the
+shape term, lambda grows by a fixed factor after every step that was not cut short, so shape decides
+early and volume late. The recorded energy is the energy divided by lambda: it cannot rise, neither in
+a step nor when lambda grows.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from .progress import Progress, report
+from .results import IterationRecord
+
+__all__ = ["FlipFreeOptions", "FlipFreeSolver"]
+
+_FREE, _FIXED, _GLIDING = 0, 1, 2
+_NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class FlipFreeOptions:
+    """Knobs of the flip-free minimisation; the defaults are meant for every mesh.
+
+    Attributes
+    ----------
+    volume_weight : float
+        Largest lambda.
+    growth : float
+        Factor by which lambda grows.
+    frozen_weight : float
+        Lambda at which the boundary starts to glide, if it does.
+    face_weight : float
+        Weight of the boundary triangles' barrier while the boundary glides.
+    max_aspect : float
+        Source tets with a larger ratio of extreme singular values (relative to a regular tet) are
+        slivers: their shape is not asked to be kept.
+    untangle_iter, frozen_iter, glide_iter : int
+        Most steps of each stage.
+    tol : float
+        At the largest lambda: stop when a step lowers the energy by no more than this share.
+    cg_tol, max_cg
+        Relative residual and most iterations of the linear solves.
+    """
+
+    volume_weight: float = 1e4
+    growth: float = 2.0
+    frozen_weight: float = 10.0
+    face_weight: float = 1.0
+    max_aspect: float = 6.0
+    untangle_iter: int = 200
+    frozen_iter: int = 60
+    glide_iter: int = 60
+    tol: float = 2e-3
+    cg_tol: float = 0.1
+    max_cg: int = 200
+
+
+@dataclass
+class FlipFreeSolver:
+    """One solid on its way to a flip-free map.
+
+    Attributes
+    ----------
+    V : ndarray, shape (n, 3)
+        Source positions, scaled to the volume of the image.
+    T : ndarray of int32, shape (k, 4)
+    boundary : ndarray of int32, shape (nb,)
+        Boundary vertices, in the numbering of ``faces``.
+    faces : ndarray of int32, shape (m, 3)
+        Boundary faces in solid vertex ids.
+    R, r : float
+        Radii of the torus the boundary image lies on.
+    options : FlipFreeOptions
+    progress : Progress or None
+    history : list of IterationRecord
+    """
+
+    V: NDArray[np.float64]
+    T: NDArray[np.int32]
+    boundary: NDArray[np.int32]
+    faces: NDArray[np.int32]
+    R: float
+    r: float
+    options: FlipFreeOptions
+    progress: Progress | None = None
+    history: list[IterationRecord] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        volumes = _core.signed_tet_volumes(self.V, self.T)
+        self._shares = volumes / volumes.sum()
+        self._rings = _core.ring_sums(self.T, self._shares, len(self.V))
+        self._rest = _core.rest_matrices(self.V, self.T, self.options.max_aspect)
+
+    def _newton(self, x: NDArray[np.float64], boundary_motion: int) -> _core.SolidNewton:
+        motion = np.full(len(self.V), _FREE, np.uint8)
+        motion[self.boundary] = boundary_motion
+        faces, face_rest, face_weights = _NO_FACES
+        if boundary_motion == _GLIDING:
+            faces = self.faces
+            corners = self.V[faces]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            areas = 0.5 * np.linalg.norm(normals, axis=1)
+            face_weights = areas / areas.sum()
+            scale = 4.0 * math.pi**2 * self.R * self.r / areas.sum()
+            face_rest = _core.rest_triangles(self.V, faces, scale)
+        return _core.SolidNewton(
+            self.T, self._rest, self._shares, motion, self.R, self.r, x, faces, face_rest,
+            face_weights,
+        )  # fmt: skip
+
+    def _record(
+        self,
+        stage: str,
+        iteration: int,
+        x: NDArray[np.float64],
+        energy: float,
+        step: float,
+        residual: float,
+        clock: float,
+        total: int,
+    ) -> None:
+        volumes = _core.signed_tet_volumes(x, self.T)
+        shares = volumes / volumes.sum()
+        record = IterationRecord(
+            stage=stage,
+            iteration=iteration,
+            energy=energy,
+            step=step,
+            residual=residual,
+            flips=int(np.count_nonzero(~(volumes > 0.0))),
+            ring_sd=float((_core.ring_sums(self.T, shares, len(self.V)) / self._rings).std()),
+            element_sd=float((shares / self._shares).std()),
+            seconds=time.perf_counter() - clock,
+        )
+        self.history.append(record)
+        report(
+            self.progress, stage, iteration, total, flips=record.flips, element_sd=record.element_sd
+        )
+
+    def untangle(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+        """Turn every inverted tet, boundary held: foldover-free mapping by continuation.
+
+        The regularisation epsilon follows the worst determinant down (Garanzha et al., 2021,
+        section 3.2); between two steps the energy may rise because epsilon changed, within a step
+        it cannot.
+
+        Returns
+        -------
+        x : ndarray, shape (n, 3)
+        flips : int
+            Tets still inverted; zero means success.
+        """
+        o = self.options
+        newton = self._newton(x, _FIXED)
+        clock = time.perf_counter()
+        state = newton.value(x, _core.EnergyWeights(1.0, 1.0, 1.0))
+        if state.flips == 0:
+            return x, 0
+        epsilon = max(0.2 * abs(state.min_det), 1e-6)
+        for iteration in range(1, o.untangle_iter + 1):
+            x, step = newton.step(
+                x, _core.EnergyWeights(1.0, 1.0, epsilon), min(o.cg_tol, 1e-2), o.max_cg
+            )
+            after = step.after
+            self._record(
+                "untangle", iteration, x, after.energy, step.alpha, epsilon, clock, o.untangle_iter
+            )
+            if after.flips == 0:
+                return x, 0
+            epsilon = _next_epsilon(epsilon, step.before.energy, after.energy, after.min_det)
+        return x, int(after.flips)
+
+    def minimise(
+        self, x: NDArray[np.float64], *, glide: bool, start: float, goal: float
+    ) -> tuple[NDArray[np.float64], bool, str]:
+        """Newton steps with lambda growing from ``start`` to ``goal``; no tet turns over.
+
+        Returns
+        -------
+        x : ndarray, shape (n, 3)
+        converged : bool
+        stop_reason : str
+        """
+        o = self.options
+        stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
+        face = o.face_weight if glide else 0.0
+        newton = self._newton(x, _GLIDING if glide else _FIXED)
+        clock = time.perf_counter()
+        weight = start
+        for iteration in range(1, total + 1):
+            weights = _core.EnergyWeights(1.0, weight, 0.0, face)
+            x, step = newton.step(x, weights, o.cg_tol, o.max_cg)
+            before, after = step.before.energy / weight, step.after.energy / weight
+            self._record(stage, iteration, x, after, step.alpha, step.decrement, clock, total)
+            if weight < goal:
+                if step.alpha >= 0.5:
+                    weight = min(goal, o.growth * weight)
+                elif step.alpha == 0.0:
+                    return x, False, f"no step lowers the energy at lambda = {weight:g}"
+            elif before - after <= o.tol * before:
+                return x, True, "the energy stopped decreasing"
+        if weight < goal:
+            return x, False, "most iterations done"
+        return x, goal < o.volume_weight, "most iterations done"
+
+
+def _next_epsilon(epsilon: float, before: float, after: float, min_det: float) -> float:
+    """Regularisation for the next step, from the decrease achieved and the worst determinant."""
+    gain = max(0.1, 1.0 - after / before)
+    chi = 0.5 * (min_det + math.sqrt(epsilon * epsilon + min_det * min_det))
+    goal = (1.0 - gain) * chi
+    return max(2.0 * math.sqrt(goal * (goal - min_det)), 1e-12) if min_det < goal else 1e-12

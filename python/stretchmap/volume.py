@@ -1,0 +1,452 @@
+"""Maps of a solid onto the standard solid torus that preserve volume."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._arrays import read_only
+from .area import AreaMap, area_map
+from .certificate import Certificate, certify
+from .errors import ArrayError, CertificationError, DegenerateError, OptionError
+from .flip_free import FlipFreeOptions, FlipFreeSolver
+from .measures import Distortion, distortion
+from .progress import Progress
+from .refine import Refinement, boundary_joins, refine_boundary_joins
+from .results import IterationRecord, MapResult
+from .torus import Torus
+from .vsem import minimise_volumetric_stretch
+
+if TYPE_CHECKING:
+    from .mesh import TetMesh
+
+__all__ = ["VolumeMap", "volume_map"]
+
+_log = logging.getLogger("stretchmap")
+
+# Before untangling, a few regularised steps (5.6) remove most flips of the harmonic map for little.
+_WARM_STEPS, _WARM_C = 3, 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeMap(MapResult):
+    """A map of a solid onto the solid torus.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        The mesh that was mapped: the input, or its refinement (see ``refinement``); the first
+        vertices are those of the input.
+    image : ndarray, shape (n, 3)
+        Image of each vertex. The image has the volume of the source.
+    torus : Torus
+        Boundary vertices lie on it.
+    method : str
+        ``"certified"`` or ``"vsem"``.
+    boundary : str
+        ``"frozen"`` or ``"glide"``.
+    boundary_map : AreaMap or None
+        The boundary map; None if the boundary was prescribed.
+    refinement : Refinement or None
+        How ``solid`` came from the input, if it was refined.
+    history : tuple of IterationRecord
+        Stages ``"vsem"``, ``"untangle"``, ``"frozen"``, ``"glide"``, in that order.
+    distortion : Distortion
+    certificate : Certificate
+        Whether the map is proven to be a bijection, computed independently of the optimisation.
+    converged : bool
+    stop_reason : str
+    seconds : dict
+        Wall-clock time per stage.
+    """
+
+    title = "volume"
+
+    solid: TetMesh
+    image: NDArray[np.float64]
+    torus: Torus
+    method: str
+    boundary: str
+    boundary_map: AreaMap | None = field(repr=False)
+    refinement: Refinement | None = field(repr=False)
+    history: tuple[IterationRecord, ...] = field(repr=False)
+    distortion: Distortion
+    certificate: Certificate
+    converged: bool
+    stop_reason: str
+    seconds: Mapping[str, float]
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """Method, boundary and what was added to the input mesh."""
+        added = self.refinement
+        return {
+            "method": self.method,
+            "boundary": self.boundary,
+            "added_vertices": 0 if added is None else added.n_split,
+            "added_tets": 0 if added is None else added.n_added_tets,
+        }
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """``parent_tet`` (k,), the input tet of each tet, if the mesh was refined."""
+        return {} if self.refinement is None else {"parent_tet": self.refinement.parent_tet}
+
+
+def volume_map(
+    solid: TetMesh,
+    *,
+    method: str | None = None,
+    boundary: str | None = None,
+    c: float | None = None,
+    max_iter: int | None = None,
+    tol: float | None = None,
+    ratio: str | float | None = None,
+    phase: float | None = None,
+    boundary_map: AreaMap | None = None,
+    start: ArrayLike | None = None,
+    torus: Torus | None = None,
+    refine: bool = True,
+    keep_best: bool = False,
+    solver: str = "auto",
+    options: FlipFreeOptions | None = None,
+    progress: Progress | None = None,
+) -> VolumeMap:
+    """Map a solid with a hole onto the solid torus, every piece keeping its volume.
+
+    Parameters
+    ----------
+    solid : TetMesh
+        A solid torus.
+    method : {"certified", "vsem"}, optional
+        ``"certified"``: a bijection with the least volume distortion, proven by a certificate.
+        ``"vsem"``: Algorithm 5.1 as it stands in the paper; may leave flipped tets, which are
+        reported. Default: ``"vsem"`` if ``c`` is given, else ``"certified"``.
+    boundary : {"glide", "frozen"}, optional
+        Certified route only. ``"glide"`` (default) lets boundary vertices move on the torus,
+        ``"frozen"`` keeps them where the area-preserving map put them.
+    c : float, optional
+        Regularisation constant of (5.6) of the ``"vsem"`` method, dimensionless, default 0.
+    max_iter : int, optional
+        Most steps of ``"vsem"`` (default 20) or of the last stage of ``"certified"``.
+    tol : float, optional
+        Stop when a step lowers the energy by no more than this share (default 1e-6 for ``"vsem"``,
+        2e-3 for ``"certified"``).
+    ratio : "conformal", "search" or float, optional
+        R / r of the torus, as in `area_map`. Default: the conformal one for ``"vsem"``, a search
+        for ``"certified"``.
+    phase : float, optional
+        As in `area_map`.
+    boundary_map : AreaMap, optional
+        Map of ``solid.surface`` to be used instead of a computed one.
+    start : array_like, shape (n, 3), optional
+        Image to go on from, such as that of a saved map, with its ``torus``; the boundary vertices
+        have to lie on it.
+    torus : Torus, optional
+        With ``start`` only.
+    refine : bool
+        Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
+        can repair. False: refuse such a mesh.
+    keep_best : bool
+        Return the best map found even if it is not certified.
+    solver : {"auto", "direct", "multigrid", "jacobi"}
+        Linear solver of the harmonic and fixed-point steps.
+    options : FlipFreeOptions, optional
+        Finer knobs of the certified route.
+    progress : Progress, optional
+        Called once per step.
+
+    Returns
+    -------
+    VolumeMap
+
+    Raises
+    ------
+    MeshError
+        The mesh is not a solid torus, see `TetMesh.require_solid_torus`.
+    DegenerateError
+        ``refine=False`` and some interior edge or face cannot be repaired; ``ids`` are the tets.
+    CertificationError
+        The certified route left flipped tets or failed the certificate, ``ids`` are the elements.
+    OptionError
+        An option out of range or combined with one it excludes.
+    SolverError
+        A linear solve broke down.
+    """
+    if method is None:
+        method = "certified" if c is None else "vsem"
+    _check_options(method, boundary, c, max_iter, tol, start, torus, boundary_map)
+    solid.require_solid_torus()
+    seconds: dict[str, float] = {}
+
+    certified = method == "certified"
+    if start is None and boundary_map is None:
+        clock = time.perf_counter()
+        if ratio is None:
+            ratio = "search" if certified else "conformal"
+        boundary_map = area_map(solid.surface, ratio=ratio, phase=phase, progress=progress)
+        seconds["boundary"] = time.perf_counter() - clock
+
+    refinement = None
+    if certified:
+        clock = time.perf_counter()
+        if refine:
+            refinement = refine_boundary_joins(solid)
+        else:
+            _refuse_joins(solid)
+        seconds["refine"] = time.perf_counter() - clock
+    problem = _Problem.build(solid, refinement, boundary_map, start, torus)
+    if not certified:
+        return _vsem_map(problem, c or 0.0, max_iter, tol, solver, boundary_map, seconds, progress)
+    options = _with_overrides(options or FlipFreeOptions(), max_iter, tol)
+    return _certified_map(
+        problem, boundary or "glide", options, solver, boundary_map, refinement, keep_best, seconds,
+        progress,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Source and torus on one scale: the polyhedron the boundary image encloses has volume 1."""
+
+    solid: TetMesh
+    V: NDArray[np.float64]
+    x: NDArray[np.float64]
+    torus: Torus
+    scale: float  # lengths of the result per length here
+    warm: bool  # x is a whole map, not only its boundary
+
+    @classmethod
+    def build(
+        cls,
+        solid: TetMesh,
+        refinement: Refinement | None,
+        boundary_map: AreaMap | None,
+        start: ArrayLike | None,
+        torus: Torus | None,
+    ) -> _Problem:
+        mesh = solid if refinement is None else refinement.solid
+        ids = solid.boundary_vertices
+        if start is not None:
+            assert torus is not None
+            image = np.array(start, dtype=np.float64)
+            if image.shape != solid.V.shape:
+                raise ArrayError(f"start must have shape {solid.V.shape}, got {image.shape}")
+            x = image if refinement is None else refinement.prolong(image)
+        else:
+            assert boundary_map is not None
+            torus = boundary_map.torus
+            x = np.zeros((mesh.n_vertices, 3))
+            x[ids] = boundary_map.image
+        enclosed = _enclosed_volume(x[ids], solid.surface.F)
+        if not enclosed > 0.0:
+            raise DegenerateError("the boundary image encloses no volume; is it inside out?")
+        shrink = enclosed ** (-1.0 / 3.0)
+        scale = solid.volume ** (1.0 / 3.0)
+        V = (mesh.V - mesh.V.mean(axis=0)) / scale
+        return cls(mesh, V, x * shrink, torus.scaled(shrink), scale, start is not None)
+
+    @property
+    def fixed(self) -> NDArray[np.uint8]:
+        flags = np.zeros(self.solid.n_vertices, np.uint8)
+        flags[self.solid.boundary_vertices] = 1
+        return flags
+
+    def result_scale(self, x: NDArray[np.float64]) -> float:
+        """Factor that gives the image the volume of the source."""
+        volume = float(_core.signed_tet_volumes(x, self.solid.T).sum())
+        return self.scale * volume ** (-1.0 / 3.0)
+
+
+def _enclosed_volume(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
+def _check_options(
+    method: str,
+    boundary: str | None,
+    c: float | None,
+    max_iter: int | None,
+    tol: float | None,
+    start: ArrayLike | None,
+    torus: Torus | None,
+    boundary_map: AreaMap | None,
+) -> None:
+    if method not in ("certified", "vsem"):
+        raise OptionError(f"method must be 'certified' or 'vsem', got {method!r}")
+    if boundary not in (None, "glide", "frozen"):
+        raise OptionError(f"boundary must be 'glide' or 'frozen', got {boundary!r}")
+    if method == "vsem" and boundary == "glide":
+        raise OptionError("Algorithm 5.1 holds the boundary; use method='certified' to let it glide")
+    if method == "certified" and c is not None:
+        raise OptionError("c belongs to Algorithm 5.1; use method='vsem' or leave it out")
+    if c is not None and not (c >= 0.0 and math.isfinite(c)):
+        raise OptionError(f"c must be finite and not negative, got {c}")
+    if max_iter is not None and max_iter < 0:
+        raise OptionError(f"max_iter must not be negative, got {max_iter}")
+    if tol is not None and not tol >= 0.0:
+        raise OptionError(f"tol must not be negative, got {tol}")
+    if (start is None) != (torus is None):
+        raise OptionError("start and torus go together: an image to go on from and its torus")
+    if start is not None and boundary_map is not None:
+        raise OptionError("give either start or boundary_map, not both")
+
+
+def _with_overrides(
+    options: FlipFreeOptions, max_iter: int | None, tol: float | None
+) -> FlipFreeOptions:
+    if max_iter is not None:
+        options = dataclasses.replace(options, frozen_iter=max_iter, glide_iter=max_iter)
+    return options if tol is None else dataclasses.replace(options, tol=tol)
+
+
+def _refuse_joins(solid: TetMesh) -> None:
+    joins = boundary_joins(solid)
+    if len(joins):
+        raise DegenerateError(
+            f"{len(joins.edges)} interior edges and {len(joins.faces)} interior faces have all "
+            "their vertices on the boundary, so the boundary map alone decides about the tets at "
+            "them; allow their refinement (refine=True)",
+            joins.tets,
+        )
+
+
+def _vsem_map(
+    problem: _Problem,
+    c: float,
+    max_iter: int | None,
+    tol: float | None,
+    solver: str,
+    boundary_map: AreaMap | None,
+    seconds: dict[str, float],
+    progress: Progress | None,
+) -> VolumeMap:
+    clock = time.perf_counter()
+    run = minimise_volumetric_stretch(
+        problem.V,
+        problem.solid.T,
+        problem.fixed,
+        problem.x,
+        c=c,
+        max_iter=20 if max_iter is None else max_iter,
+        tol=1e-6 if tol is None else tol,
+        harmonic=not problem.warm,
+        solver=solver,
+        progress=progress,
+    )
+    seconds["vsem"] = time.perf_counter() - clock
+    return _finish(
+        problem, run.image, "vsem", "frozen", boundary_map, None, run.history, run.converged,
+        run.stop_reason, seconds,
+    )  # fmt: skip
+
+
+def _certified_map(
+    problem: _Problem,
+    boundary: str,
+    options: FlipFreeOptions,
+    solver: str,
+    boundary_map: AreaMap | None,
+    refinement: Refinement | None,
+    keep_best: bool,
+    seconds: dict[str, float],
+    progress: Progress | None,
+) -> VolumeMap:
+    solid, x = problem.solid, problem.x
+    history: tuple[IterationRecord, ...] = ()
+    if not problem.warm:
+        clock = time.perf_counter()
+        run = minimise_volumetric_stretch(
+            problem.V, solid.T, problem.fixed, x, c=_WARM_C, max_iter=_WARM_STEPS, tol=0.0,
+            solver=solver, progress=progress,
+        )  # fmt: skip
+        x, history = run.image, run.history
+        seconds["vsem"] = time.perf_counter() - clock
+    flip_free = FlipFreeSolver(
+        V=problem.V,
+        T=solid.T,
+        boundary=solid.boundary_vertices,
+        faces=solid.boundary_vertices[solid.surface.F],
+        R=problem.torus.R,
+        r=problem.torus.r,
+        options=options,
+        progress=progress,
+    )
+    clock = time.perf_counter()
+    x, flips = flip_free.untangle(x)
+    seconds["untangle"] = time.perf_counter() - clock
+    converged, stop_reason = False, f"{flips} tets could not be untangled"
+    if flips == 0:
+        glide = boundary == "glide"
+        clock = time.perf_counter()
+        goal = options.frozen_weight if glide else options.volume_weight
+        if not (problem.warm and glide):
+            first = options.volume_weight if problem.warm else 1.0
+            x, converged, stop_reason = flip_free.minimise(x, glide=False, start=first, goal=goal)
+            seconds["frozen"] = time.perf_counter() - clock
+        if glide:
+            clock = time.perf_counter()
+            first = options.volume_weight if problem.warm else goal
+            x, converged, stop_reason = flip_free.minimise(
+                x, glide=True, start=first, goal=options.volume_weight
+            )
+            seconds["glide"] = time.perf_counter() - clock
+    result = _finish(
+        problem, x, "certified", boundary, boundary_map, refinement,
+        history + tuple(flip_free.history), converged, stop_reason, seconds,
+    )  # fmt: skip
+    if not result.certificate.certified and not keep_best:
+        ids = next(iter(result.certificate.ids.values()), ())
+        raise CertificationError(
+            f"the map is not certified: {result.certificate.reason}; keep_best=True returns it all "
+            "the same",
+            ids,
+        )
+    return result
+
+
+def _finish(
+    problem: _Problem,
+    x: NDArray[np.float64],
+    method: str,
+    boundary: str,
+    boundary_map: AreaMap | None,
+    refinement: Refinement | None,
+    history: tuple[IterationRecord, ...],
+    converged: bool,
+    stop_reason: str,
+    seconds: dict[str, float],
+) -> VolumeMap:
+    scale = problem.result_scale(x)
+    image, torus = x * scale, problem.torus.scaled(scale)
+    clock = time.perf_counter()
+    figures = distortion(problem.solid, image)
+    certificate = certify(problem.solid, image, torus)
+    seconds["certificate"] = time.perf_counter() - clock
+    if not converged:
+        _log.warning("volume map not converged: %s", stop_reason)
+    if figures.flips:
+        _log.warning("volume map has %d flipped tets", figures.flips)
+    return VolumeMap(
+        solid=problem.solid,
+        image=read_only(image),
+        torus=torus,
+        method=method,
+        boundary=boundary,
+        boundary_map=boundary_map,
+        refinement=refinement if refinement is not None and refinement.n_split else None,
+        history=history,
+        distortion=figures,
+        certificate=certificate,
+        converged=converged,
+        stop_reason=stop_reason,
+        seconds=seconds,
+    )
