@@ -285,7 +285,9 @@ def _check_options(
     if boundary not in (None, "glide", "frozen"):
         raise OptionError(f"boundary must be 'glide' or 'frozen', got {boundary!r}")
     if method == "vsem" and boundary == "glide":
-        raise OptionError("Algorithm 5.1 holds the boundary; use method='certified' to let it glide")
+        raise OptionError(
+            "Algorithm 5.1 holds the boundary; use method='certified' to let it glide"
+        )
     if method == "certified" and c is not None:
         raise OptionError("c belongs to Algorithm 5.1; use method='vsem' or leave it out")
     if c is not None and not (c >= 0.0 and math.isfinite(c)):

@@ -6,7 +6,6 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
-import scipy.sparse.linalg
 
 import stretchmap as sm
 from stretchmap import _core, samples
@@ -193,7 +192,7 @@ def test_a_tangled_start_is_untangled(bumpy):
     good = sm.volume_map(bumpy, boundary="frozen", max_iter=6)
     inner = np.setdiff1d(np.arange(bumpy.n_vertices), bumpy.boundary_vertices)
     start = good.image.copy()
-    start[inner] += 0.05 * good.torus.r * RNG.standard_normal((len(inner), 3))
+    start[inner] += 0.15 * good.torus.r * RNG.standard_normal((len(inner), 3))
     flips = np.count_nonzero(_core.signed_tet_volumes(start, bumpy.T) <= 0.0)
     assert flips > 10
     again = sm.volume_map(bumpy, start=start, torus=good.torus, max_iter=2)
