@@ -10,15 +10,8 @@ from numpy.typing import NDArray
 
 from . import _core
 from ._arrays import describe, read_only
-from .errors import (
-    ConnectivityError,
-    DegenerateError,
-    GenusError,
-    MeshError,
-    NonManifoldError,
-    OpenSurfaceError,
-    OrientationError,
-)
+from ._defects import WORDINGS, Defect
+from .errors import ConnectivityError, GenusError
 
 __all__ = ["Defect", "Diagnosis", "diagnose_solid", "diagnose_surface"]
 
@@ -27,32 +20,6 @@ Ids = NDArray[np.int32]
 
 def _none(*shape: int) -> Ids:
     return read_only(np.empty(shape, np.int32))
-
-
-@dataclass(frozen=True, eq=False)
-class Defect:
-    """One kind of fault.
-
-    Attributes
-    ----------
-    name : str
-        Short name: that of the field of `Diagnosis` which holds the ids.
-    message : str
-        One sentence: what is wrong, where, and the remedy.
-    ids : tuple of int
-        Elements or vertices at fault; edges and faces given by vertices are flattened.
-    error : type
-        The exception `require_...` raises for it.
-    """
-
-    name: str
-    message: str
-    ids: tuple[int, ...]
-    error: type[MeshError]
-
-    def exception(self) -> MeshError:
-        """Return the exception that reports this defect."""
-        return self.error(self.message, self.ids)
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,79 +189,10 @@ class Diagnosis:
         return "genus " + ", ".join(map(str, self.genus.tolist()))
 
     def _defects(self) -> Iterable[Defect]:
-        element, none = self.element, f"without {'area' if self.kind == 'surface' else 'volume'}"
-        turn = "pass orient=True to turn them"
-        surface = self.kind == "surface"
-        table: list[tuple[str, type[MeshError], str, str]] = [
-            ("repeated", DegenerateError, element, "{} with a repeated vertex; remove them"),
-            ("duplicates", DegenerateError, element, "{}, a second copy; remove them"),
-            (
-                "nonmanifold_faces",
-                NonManifoldError,
-                "face",
-                "{} shared by more than two tets; remove the surplus tets",
-            ),
-            (
-                "nonmanifold_edges",
-                NonManifoldError,
-                "edge",
-                "{} with more than two "
-                + ("faces" if surface else "boundary faces")
-                + "; separate the sheets that meet there",
-            ),
-            (
-                "nonmanifold_vertices",
-                NonManifoldError,
-                "vertex",
-                "{} not surrounded by a single fan of "
-                + f"{element}s; duplicate the vertex, one copy per fan",
-            ),
-            ("border_edges", OpenSurfaceError, "edge", "{} on a border; close the holes"),
-            (
-                "not_orientable",
-                OrientationError,
-                element,
-                "{} cannot be oriented with their neighbours: the "
-                + f"{self.kind} is not orientable; cut or remesh it there",
-            ),
-            (
-                "misoriented",
-                OrientationError,
-                element,
-                "{} oriented against "
-                + ("the other faces; " if surface else "the solid, with negative volume; ")
-                + turn,
-            ),
-            (
-                "inside_out",
-                OrientationError,
-                "face",
-                "the surface is inside out, its normals point inward: {}; " + turn,
-            ),
-            (
-                "inverted",
-                OrientationError,
-                "tet",
-                "{} inverted, folded over their neighbours; turning cannot help, the vertices "
-                "have to be moved or the solid remeshed",
-            ),
-            ("degenerate", DegenerateError, element, "{} " + none + "; remove or remesh them"),
-            (
-                "unreferenced",
-                DegenerateError,
-                "vertex",
-                "{} used by no " + element + "; remove them, compact() does",
-            ),
-        ]
-        for name, error, what, message in table:
-            ids = getattr(self, name)
+        for wording in WORDINGS[self.kind]:
+            ids = getattr(self, wording.name)
             if len(ids):
-                yield Defect(
-                    name,
-                    message.format(describe(what, ids)),
-                    tuple(ids.ravel().tolist()),
-                    error,
-                )
+                yield wording.defect(ids)
         if self.n_components > 1:
             yield self._disconnected()
 

@@ -1,29 +1,15 @@
-"""Every public entry point that takes a mesh, against every defect.
-
-`ENTRIES` is the list to extend: a name, the kind of mesh, the function, and how far it looks
-(``"arrays"`` at the arrays alone, ``"closed"`` also at the topology of any genus, ``"torus"`` also
-at the genus). `DEFECTS` says what is expected at each of these depths. Run as a program this module
-goes through all defects for one entry and prints one line of JSON for each, so that a crash shows
-which one did it.
-"""
+"""Damaged meshes, and what each has to lead to."""
 
 from __future__ import annotations
 
-import json
-import os
-import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import shapes
-import stretchmap
-from stretchmap import TetMesh, TriMesh, errors
-from stretchmap.refine import refine_boundary_joins
+from stretchmap import TetMesh, errors
 
 DEPTHS = ("arrays", "closed", "torus")
 
@@ -37,17 +23,6 @@ class Defect:
     arrays: Callable[[], tuple[Any, Any]]
     error: type[Exception]
     ids: tuple[int, ...] | None  # None: not checked
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A function of raw arrays that is to notice every defect up to its depth."""
-
-    name: str
-    kind: str
-    depth: str
-    call: Callable[[Any, Any], Any]
-    without: tuple[str, ...] = ()  # defects that cannot get there
 
 
 # ----------------------------------------------------------------------------------- base meshes
@@ -283,139 +258,3 @@ DEFECTS = {
     "surface": [*array_defects("surface"), *surface_defects()],
     "solid": [*array_defects("solid"), *solid_defects()],
 }
-
-
-# --------------------------------------------------------------------------------- entry points
-
-
-NOT_IN_FILES = ("ragged points", "no points")
-
-
-def through_file(points: Any, elements: Any, key: str) -> Any:
-    """Write the arrays as they are and read them back."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "mesh.npz"
-        np.savez(path, V=np.asarray(points), **{key: np.asarray(elements)})
-        return stretchmap.read(path)
-
-
-def diagnosed(mesh: Any) -> Any:
-    """Raise the first defect `diagnose` lists, after its summary has been made."""
-    found = mesh.diagnose()
-    assert found.summary().count("\n") == max(len(found.defects), 1)
-    found.require()
-    return found
-
-
-def every_property(mesh: Any) -> None:
-    """All lazy properties: each has a value or a reason."""
-    names = [n for n in dir(type(mesh)) if isinstance(getattr(type(mesh), n), property)]
-    names += ["topology", "edges", "area", "volume"] if isinstance(mesh, TriMesh) else []
-    names += ["surface", "edges", "tet_volumes"] if isinstance(mesh, TetMesh) else []
-    for name in names:
-        try:
-            getattr(mesh, name)
-        except errors.MeshError as error:
-            assert str(error)
-
-
-def homology_of(mesh: TetMesh) -> Any:
-    """Homology of the boundary with labels from inside."""
-    return stretchmap.homology_basis(mesh.surface, mesh)
-
-
-ENTRIES = [
-    Entry("TriMesh", "surface", "arrays", TriMesh),
-    Entry("TriMesh orient", "surface", "arrays", lambda V, F: TriMesh(V, F, orient=True)),
-    Entry("TriMesh properties", "surface", "arrays", lambda V, F: every_property(TriMesh(V, F))),
-    Entry("TriMesh.compact", "surface", "arrays", lambda V, F: TriMesh(V, F).compact()),
-    Entry("TriMesh.diagnose", "surface", "closed", lambda V, F: diagnosed(TriMesh(V, F))),
-    Entry("require_closed", "surface", "closed", lambda V, F: TriMesh(V, F).require_closed()),
-    Entry("require_genus_one", "surface", "torus", lambda V, F: TriMesh(V, F).require_genus_one()),
-    Entry("TetMesh", "solid", "arrays", TetMesh),
-    Entry("TetMesh orient", "solid", "arrays", lambda V, T: TetMesh(V, T, orient=True)),
-    Entry("TetMesh properties", "solid", "arrays", lambda V, T: every_property(TetMesh(V, T))),
-    Entry("TetMesh.compact", "solid", "arrays", lambda V, T: TetMesh(V, T).compact()),
-    Entry("TetMesh.diagnose", "solid", "closed", lambda V, T: diagnosed(TetMesh(V, T))),
-    Entry(
-        "require_solid_torus", "solid", "torus", lambda V, T: TetMesh(V, T).require_solid_torus()
-    ),
-    Entry("read surface", "surface", "arrays", lambda V, F: through_file(V, F, "F"), NOT_IN_FILES),
-    Entry("read solid", "solid", "arrays", lambda V, T: through_file(V, T, "T"), NOT_IN_FILES),
-    Entry(
-        "homology_basis",
-        "surface",
-        "closed",
-        lambda V, F: stretchmap.homology_basis(TriMesh(V, F)),
-    ),
-    Entry(
-        "holomorphic_forms",
-        "surface",
-        "closed",
-        lambda V, F: stretchmap.holomorphic_forms(TriMesh(V, F)),
-    ),
-    Entry(
-        "conformal_map", "surface", "torus", lambda V, F: stretchmap.conformal_map(TriMesh(V, F))
-    ),
-    Entry(
-        "area_map",
-        "surface",
-        "torus",
-        lambda V, F: stretchmap.area_map(TriMesh(V, F), phase=0.0, sem_iter=2),
-    ),
-    Entry(
-        "distortion of a surface",
-        "surface",
-        "arrays",
-        lambda V, F: stretchmap.distortion(TriMesh(V, F), 2 * TriMesh(V, F).V),
-    ),
-    Entry(
-        "distortion of a solid",
-        "solid",
-        "arrays",
-        lambda V, T: stretchmap.distortion(TetMesh(V, T), 2 * TetMesh(V, T).V),
-    ),
-    Entry(
-        "refine_boundary_joins",
-        "solid",
-        "arrays",
-        lambda V, T: refine_boundary_joins(TetMesh(V, T)),
-    ),
-    Entry(
-        "homology_basis of a solid",
-        "solid",
-        "arrays",
-        lambda V, T: homology_of(TetMesh(V, T)),
-    ),
-]
-
-
-def expected(entry: Entry) -> list[Defect]:
-    """The defects that can reach an entry point."""
-    return [d for d in DEFECTS[entry.kind] if d.name not in entry.without]
-
-
-def run(entry: Entry) -> None:
-    """Print what each defect, and the sound mesh, leads to."""
-    cases = [("sound", BASES[entry.kind])]
-    cases += [(defect.name, defect.arrays) for defect in expected(entry)]
-    for name, arrays in cases:
-        print(json.dumps({"at": name}), flush=True)
-        points, elements = arrays()
-        outcome: dict[str, Any] = {"name": name, "error": None, "ids": [], "mro": []}
-        try:
-            entry.call(points, elements)
-        except Exception as error:
-            outcome = {
-                "name": name,
-                "error": type(error).__name__,
-                "message": str(error),
-                "ids": list(getattr(error, "ids", [])),
-                "mro": [kind.__name__ for kind in type(error).__mro__],
-            }
-        print(json.dumps(outcome), flush=True)
-
-
-if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    run(next(entry for entry in ENTRIES if entry.name == sys.argv[1]))

@@ -15,16 +15,17 @@ from pathlib import Path
 import pytest
 
 import defect_table
+import entry_points
 
 HERE = Path(__file__).parent
-ENTRIES = {entry.name: entry for entry in defect_table.ENTRIES}
+ENTRIES = {entry.name: entry for entry in entry_points.ENTRIES}
 
 
 @pytest.mark.parametrize("name", ENTRIES)
 def test_entry_point_against_every_defect(name):
     entry = ENTRIES[name]
     process = subprocess.run(
-        [sys.executable, "-X", "faulthandler", str(HERE / "defect_table.py"), name],
+        [sys.executable, "-X", "faulthandler", str(HERE / "entry_points.py"), name],
         capture_output=True,
         text=True,
         timeout=120,
@@ -35,7 +36,7 @@ def test_entry_point_against_every_defect(name):
     outcomes = {line["name"]: line for line in lines if "name" in line}
     assert outcomes["sound"]["error"] is None, outcomes["sound"]
     depth = defect_table.DEPTHS.index(entry.depth)
-    for defect in defect_table.expected(entry):
+    for defect in entry_points.expected(entry):
         outcome = outcomes[defect.name]
         said = f"{name} on {defect.name}: {outcome}"
         if defect_table.DEPTHS.index(defect.depth) > depth:
@@ -56,7 +57,7 @@ def test_messages_tell_the_faults_apart():
     for defect in defect_table.surface_defects():
         points, faces = defect.arrays()
         with pytest.raises(defect.error) as caught:
-            defect_table.TriMesh(points, faces).require_genus_one()
+            entry_points.TriMesh(points, faces).require_genus_one()
         said.setdefault(defect.error.__name__, set()).add(
             re.sub(r"\d+|\(.*?\)", "", str(caught.value))
         )
@@ -69,7 +70,7 @@ def test_messages_tell_the_faults_apart():
 def test_the_table_is_about_one_defect_each():
     """A defect of the table has the defect it names and no other, or the table proves little."""
     several = {"edge of three faces", "face of many tets", "one point"}
-    for kind, mesh in (("surface", defect_table.TriMesh), ("solid", defect_table.TetMesh)):
+    for kind, mesh in (("surface", entry_points.TriMesh), ("solid", entry_points.TetMesh)):
         for defect in defect_table.DEFECTS[kind]:
             if defect.depth == "closed" and defect.name not in several:
                 found = mesh(*defect.arrays()).diagnose().defects

@@ -37,18 +37,64 @@ struct Plan {
   std::vector<Split> splits;  // by tet, then by added vertex
 };
 
-// Sorted keys of the edges on the boundary.
-std::vector<std::uint64_t> boundary_edges(const TetBoundary& boundary) {
-  std::vector<std::uint64_t> keys;
-  keys.reserve(3 * boundary.faces.rows());
-  for (Index f = 0; f < boundary.faces.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      keys.push_back(key(boundary.vertices[boundary.faces(f, k)],
-                         boundary.vertices[boundary.faces(f, (k + 1) % 3)]));
+// Vertices and edges on the boundary.
+class Rim {
+ public:
+  Rim(const TetsRef& tets, Index n_vertices) {
+    const TetBoundary boundary = tet_boundary(tets, n_vertices);
+    vertices_ = boundary.index;
+    edges_.reserve(3 * boundary.faces.rows());
+    for (Index f = 0; f < boundary.faces.rows(); ++f) {
+      for (int k = 0; k < 3; ++k) {
+        edges_.push_back(key(boundary.vertices[boundary.faces(f, k)],
+                             boundary.vertices[boundary.faces(f, (k + 1) % 3)]));
+      }
+    }
+    std::sort(edges_.begin(), edges_.end());
+  }
+  bool has(Index v) const { return vertices_[v] >= 0; }
+  bool has(Index a, Index b) const {
+    return std::binary_search(edges_.begin(), edges_.end(), key(a, b));
+  }
+
+ private:
+  IndexVec vertices_;
+  std::vector<std::uint64_t> edges_;
+};
+
+void plan_edges(const TetsRef& tets, Index n_vertices, const Rim& rim, Plan& plan) {
+  std::vector<Pair> edges;
+  const FacetGroups groups = group_tet_edges(tets, n_vertices);
+  for (Index g = 0; g < groups.size(); ++g) {
+    const Index h = groups.order[groups.start[g]];
+    const Index a = tets(h / 6, kTetEdge[h % 6][0]), b = tets(h / 6, kTetEdge[h % 6][1]);
+    if (!rim.has(a) || !rim.has(b) || rim.has(a, b)) continue;
+    const Index vertex = n_vertices + static_cast<Index>(edges.size());
+    edges.emplace_back(std::min(a, b), std::max(a, b));
+    for (Index p = groups.start[g]; p < groups.start[g + 1]; ++p) {
+      plan.splits.push_back({groups.order[p] / 6, vertex, {a, b, -1}, 2});
     }
   }
-  std::sort(keys.begin(), keys.end());
-  return keys;
+  plan.joins.edges = detail::as_rows<Edges>(edges);
+}
+
+// Added vertices are numbered from `first_vertex`.
+void plan_faces(const TetsRef& tets, Index n_vertices, Index first_vertex, const Rim& rim,
+                Plan& plan) {
+  std::vector<Triple> faces;
+  const FacetGroups groups = group_half_faces(tets, n_vertices);
+  for (Index g = 0; g < groups.size(); ++g) {
+    const Index first = groups.start[g];
+    if (groups.start[g + 1] - first < 2) continue;
+    const Triple f = half_face(tets, groups.order[first]);
+    if (!rim.has(f[0], f[1]) || !rim.has(f[1], f[2]) || !rim.has(f[2], f[0])) continue;
+    const Index vertex = first_vertex + static_cast<Index>(faces.size());
+    faces.push_back(f);
+    for (const Index p : {first, first + 1}) {
+      plan.splits.push_back({groups.order[p] / 4, vertex, {f[0], f[1], f[2]}, 3});
+    }
+  }
+  plan.joins.faces = detail::as_rows<Faces>(faces);
 }
 
 Plan plan_splits(const TetsRef& tets, Index n_vertices) {
@@ -59,47 +105,15 @@ Plan plan_splits(const TetsRef& tets, Index n_vertices) {
                     std::to_string(repeated[0]) + "; remove them",
                 {repeated.begin(), repeated.end()});
   }
-  const TetBoundary boundary = tet_boundary(tets, n_vertices);
-  const auto outside = [&](Index v) { return boundary.index[v] >= 0; };
-  const std::vector<std::uint64_t> rim = boundary_edges(boundary);
-  const auto on_rim = [&](Index a, Index b) {
-    return std::binary_search(rim.begin(), rim.end(), key(a, b));
-  };
+  const Rim rim(tets, n_vertices);
   Plan plan;
-  std::vector<Pair> edges;
-  const FacetGroups edge_groups = group_tet_edges(tets, n_vertices);
-  for (Index g = 0; g < edge_groups.size(); ++g) {
-    const Index first = edge_groups.start[g], last = edge_groups.start[g + 1];
-    const Index h = edge_groups.order[first];
-    const Index a = tets(h / 6, kTetEdge[h % 6][0]), b = tets(h / 6, kTetEdge[h % 6][1]);
-    if (!outside(a) || !outside(b) || on_rim(a, b)) continue;
-    const Index vertex = n_vertices + static_cast<Index>(edges.size());
-    edges.emplace_back(std::min(a, b), std::max(a, b));
-    for (Index p = first; p < last; ++p) {
-      plan.splits.push_back({edge_groups.order[p] / 6, vertex, {a, b, -1}, 2});
-    }
-  }
-  std::vector<Triple> faces;
-  const Index n_edges = static_cast<Index>(edges.size());
-  const FacetGroups face_groups = group_half_faces(tets, n_vertices);
-  for (Index g = 0; g < face_groups.size(); ++g) {
-    const Index first = face_groups.start[g];
-    if (face_groups.start[g + 1] - first < 2) continue;
-    const Triple f = half_face(tets, face_groups.order[first]);
-    if (!on_rim(f[0], f[1]) || !on_rim(f[1], f[2]) || !on_rim(f[2], f[0])) continue;
-    const Index vertex = n_vertices + n_edges + static_cast<Index>(faces.size());
-    faces.push_back(f);
-    for (const Index p : {first, first + 1}) {
-      plan.splits.push_back({face_groups.order[p] / 4, vertex, {f[0], f[1], f[2]}, 3});
-    }
-  }
+  plan_edges(tets, n_vertices, rim, plan);
+  plan_faces(tets, n_vertices, n_vertices + static_cast<Index>(plan.joins.edges.rows()), rim, plan);
   std::sort(plan.splits.begin(), plan.splits.end(), [](const Split& a, const Split& b) {
     return std::pair(a.tet, a.vertex) < std::pair(b.tet, b.vertex);
   });
   Mask touched(tets.rows(), 0);
   for (const Split& split : plan.splits) touched[split.tet] = 1;
-  plan.joins.edges = detail::as_rows<Edges>(edges);
-  plan.joins.faces = detail::as_rows<Faces>(faces);
   plan.joins.tets = set_entries(touched);
   return plan;
 }
