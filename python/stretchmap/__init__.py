@@ -3,9 +3,30 @@
 from __future__ import annotations
 
 import importlib
+import os
 from typing import Any
 
 __version__ = "0.1.0"
+
+
+def _load_core() -> None:
+    """Load the C++ core with OpenMP threads that sleep while they wait.
+
+    The OpenMP runtime reads its policy once, when it is loaded, and by default its threads spin:
+    on a machine that has other work to do that costs several times the run time. A policy set by
+    the user stands, and the environment is left as it was.
+    """
+    if "OMP_WAIT_POLICY" in os.environ:
+        importlib.import_module(f"{__name__}._core")
+        return
+    os.environ["OMP_WAIT_POLICY"] = "passive"
+    try:
+        importlib.import_module(f"{__name__}._core")
+    finally:
+        del os.environ["OMP_WAIT_POLICY"]
+
+
+_load_core()
 
 # name -> module; loaded on first use so that `import stretchmap` stays fast.
 _EXPORTS = {
