@@ -9,10 +9,11 @@ namespace stretchmap {
 // The shortest closed walk along edges whose period over form i is target[i].
 //
 // Every loop of the class has to pass through a vertex of a loop that it crosses algebraically.
-// So from each vertex of `crossing` the ball of half the best length so far is searched in the
-// universal abelian cover (a vertex and a sheet in Z^k, the sheet changing by the forms along each
-// edge); where the ball meets its translate by the target, a loop of the class closes. A vertex
-// done with is closed to later searches. The result is exact.
+// So from vertices of `crossing` balls are searched in the universal abelian cover (a vertex and a
+// sheet in Z^k, the sheet changing by the forms along each edge); where the ball meets its
+// translate by the target, a loop of the class closes at twice the radius. The shortest length
+// through a vertex changes at most by twice the distance between vertices, which spares most of
+// them. The result is exact.
 // \param edge_length (e) positive
 // \param forms       (k, e) integer closed 1-forms, a basis of H^1
 // \param target      (k) not zero
