@@ -124,6 +124,24 @@ ENTRIES = [
         lambda V, T: stretchmap.distortion(TetMesh(V, T), 2 * TetMesh(V, T).V),
     ),
     Entry(
+        "volume_map",
+        "solid",
+        "torus",
+        lambda V, T: stretchmap.volume_map(TetMesh(V, T), c=0.0, max_iter=1),
+    ),
+    Entry(
+        "certify a surface",
+        "surface",
+        "arrays",
+        lambda V, F: stretchmap.certify(TriMesh(V, F), TriMesh(V, F).V),
+    ),
+    Entry(
+        "certify a solid",
+        "solid",
+        "arrays",
+        lambda V, T: stretchmap.certify(TetMesh(V, T), TetMesh(V, T).V),
+    ),
+    Entry(
         "refine_boundary_joins",
         "solid",
         "arrays",
