@@ -1,5 +1,6 @@
 #include "arrays.hpp"
 #include "stretchmap/stretch/chart.hpp"
+#include "stretchmap/stretch/surface_newton.hpp"
 #include "stretchmap/stretch/surface_quality.hpp"
 #include "stretchmap/stretch/surface_sem.hpp"
 #include "stretchmap/stretch/surface_stretch.hpp"
@@ -54,7 +55,8 @@ void bind_sem(py::module_& m) {
       .def_readonly("energy", &SurfaceFigures::energy)
       .def_readonly("flips", &SurfaceFigures::flips)
       .def_readonly("ring_sd", &SurfaceFigures::ring_sd)
-      .def_readonly("face_sd", &SurfaceFigures::face_sd);
+      .def_readonly("face_sd", &SurfaceFigures::face_sd)
+      .def_readonly("face_error", &SurfaceFigures::face_error);
   py::class_<SemStep>(m, "SemStep")
       .def_readonly("step", &SemStep::step)
       .def_readonly("residual", &SemStep::residual);
@@ -87,6 +89,54 @@ void bind_quality(py::module_& m) {
         py::arg("turns").noconvert(), py::arg("candidates").noconvert(), release_gil());
 }
 
+SurfaceWeights weights_of(double area, double shape, double chart) { return {area, shape, chart}; }
+
+void bind_glide(py::module_& m) {
+  py::class_<GlideProblem>(m, "GlideProblem")
+      .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio) {
+             return GlideProblem{chart, reference, ratio};
+           }),
+           py::arg("chart"), py::arg("reference"), py::arg("ratio"), release_gil());
+  m.def(
+      "glide_energy",
+      [](const GlideProblem& problem, double area, double shape, double chart, double scale,
+         const Points2Ref& angles, bool model) {
+        GlideEnergy energy = glide_energy(problem, weights_of(area, shape, chart), scale, angles,
+                                          model ? Derivatives::kModel : Derivatives::kHessian);
+        const SurfacePattern pattern(problem.chart.faces, problem.chart.n_vertices, 2);
+        SparseMatrix hessian = pattern.zeros();
+        pattern.scatter(energy.hessians, hessian.valuePtr());
+        return std::make_tuple(energy.value, std::move(energy.gradient), std::move(hessian));
+      },
+      py::arg("problem"), py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("scale"),
+      py::arg("angles").noconvert(), py::arg("model") = false, release_gil());
+  m.def("best_scale", &best_scale, py::arg("problem"), py::arg("angles").noconvert(),
+        release_gil());
+  m.def("glide_areas", &glide_areas, py::arg("problem"), py::arg("angles").noconvert(),
+        release_gil());
+  py::class_<GlideStep>(m, "GlideStep")
+      .def_readonly("before", &GlideStep::before)
+      .def_readonly("after", &GlideStep::after)
+      .def_readonly("step", &GlideStep::step)
+      .def_readonly("decrement", &GlideStep::decrement);
+  py::class_<SurfaceNewton>(m, "SurfaceNewton")
+      .def(py::init<GlideProblem, Points2>(), py::arg("problem"), py::arg("angles"), release_gil())
+      .def(
+          "step",
+          [](SurfaceNewton& self, double area, double shape, double chart) {
+            return self.step(weights_of(area, shape, chart));
+          },
+          py::arg("area"), py::arg("shape"), py::arg("chart"), release_gil())
+      .def(
+          "project_rings",
+          [](SurfaceNewton& self, double area, double shape, double chart, double face_goal) {
+            return self.project_rings(weights_of(area, shape, chart), face_goal);
+          },
+          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("face_goal"), release_gil())
+      .def("figures", &SurfaceNewton::figures, release_gil())
+      .def_property_readonly("angles", &SurfaceNewton::angles);
+}
+
 }  // namespace
 
 void bind_area(py::module_& m) {
@@ -94,6 +144,7 @@ void bind_area(py::module_& m) {
   bind_stretch(m);
   bind_sem(m);
   bind_quality(m);
+  bind_glide(m);
 }
 
 }  // namespace stretchmap::bindings

@@ -29,6 +29,14 @@ __all__ = ["AreaMap", "area_map"]
 
 _log = logging.getLogger("stretchmap")
 
+# Weights of the finishing energy against which the area term grows.
+_SHAPE = 0.1
+_CHART = 1.0
+_GROWTH = 4.0
+_FULL_STEP = 0.5  # a step at least this long lets the area term grow
+_STALLED = 3  # steps in a row without any length end the iteration
+_RATIO_GOAL = 12.0  # largest |ratio - 1| allowed, in units of tol
+
 _PHASES = 36  # first round of the search around the tube
 _RATIOS = (1.25, 1.5, 2.0, 2.5, 3.2, 4.0, 6.0, 10.0)  # first round of the search for R / r
 
@@ -55,7 +63,9 @@ class AreaMap(MapResult):
     forms : ndarray, shape (2, e), int32
         Integer closed 1-forms of u and v, as in `ConformalMap`.
     history : tuple of IterationRecord
-        One record per iteration: stage ``"sem"`` measured in the equal-area chart.
+        One record per iteration: stage ``"sem"`` measured in the equal-area chart, its energy E_S
+        (4.1) of shares, at least 1; stage ``"newton"`` on the polyhedral image, its energy that of
+        the finishing solve over the weight of its area term. Within a stage the energy never rises.
     distortion : Distortion
         Of the polyhedral image; a face is flipped where it is negative in the (u, v) chart.
     converged : bool
@@ -105,15 +115,20 @@ def area_map(
     *,
     basis: HomologyBasis | None = None,
     conformal: ConformalMap | None = None,
+    torus: Torus | None = None,
     phase: float | None = None,
     ratio: str | float = "conformal",
+    finish: str = "ring",
+    max_iter: int = 20,
+    tol: float = 4e-3,
     sem_iter: int = 10,
     progress: Progress | None = None,
 ) -> AreaMap:
     """Map a genus-one surface onto a torus of revolution so that areas are preserved.
 
-    Stretch energy minimisation (Algorithm 4.1) in the equal-area chart of the torus, then the
-    phase around the tube by a search on the polyhedral image.
+    Stretch energy minimisation (Algorithm 4.1) in the equal-area chart of the torus; the phase
+    around the tube by a search; then Newton steps on the areas of the polyhedral image, vertices
+    gliding on the torus, no face ever turned over.
 
     Parameters
     ----------
@@ -123,10 +138,22 @@ def area_map(
         From `homology_basis`; computed if left out.
     conformal : ConformalMap, optional
         From `conformal_map`; computed if left out.
+    torus : Torus, optional
+        Torus to map onto, with its size and ratio of radii. Left out, it has the surface's area.
     phase : float, optional
         Turns to add to the equal-area coordinate around the tube; searched if left out.
     ratio : "conformal", "search" or float
-        ``R / r``: that of the conformal map, the best found by a search, or given (above 1).
+        ``R / r``: that of the conformal map, the best found by a search, or given (above 1). Not
+        together with ``torus``.
+    finish : "ring", "face" or "none"
+        ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then a
+        projection that makes the area of every vertex ring exact, kept if the faces stay within
+        ``tol`` or do not get worse. ``"none"``: the chart's map as it is.
+    max_iter : int
+        Most Newton steps.
+    tol : float
+        Goal for the standard deviation of the face ratios; the largest deviation of one is to be
+        below 12 times that.
     sem_iter : int
         Most steps of stretch energy minimisation.
     progress : Progress, optional
@@ -135,15 +162,25 @@ def area_map(
     Returns
     -------
     AreaMap
+        ``converged`` is False, and a warning logged, if ``tol`` was not reached.
 
     Raises
     ------
     OptionError
         An option out of range.
-    GenusError, MeshError, SolverError
+    SolverError
+        No start without flipped faces was found; ``ids`` are the faces.
+    GenusError, MeshError
         As `conformal_map`.
+
+    Notes
+    -----
+    The finishing solve minimises, over the angles of all vertices,
+    ``sum |t| [rho + 1/rho - 2 + (shape Q + chart (sigma + 1/sigma - 2)) / weight]``: rho a face's
+    area ratio in space, Q = (s1/s2 + s2/s1)/2 - 1 its angle distortion, sigma its area ratio in the
+    chart, which is infinite before a face turns over. The weight grows from step to step.
     """
-    _check_options(phase, ratio, sem_iter)
+    _check_options(torus, phase, ratio, finish, max_iter, tol, sem_iter)
     clock = time.perf_counter()
     seconds: dict[str, float] = {}
     if conformal is None:
@@ -155,13 +192,21 @@ def area_map(
     clock = _lap(seconds, "sem", clock)
 
     reference = _core.SurfaceReference(surface.V, surface.F)
-    phase, ratio = _search(reference, surface.F, turns, conformal.aspect, phase, ratio)
-    angles = _angles(turns, phase, ratio)
+    wanted = ratio if torus is None else torus.ratio
+    phase, ratio = _search(reference, surface.F, turns, conformal.aspect, phase, wanted)
+    angles = _angles(chart, turns, phase, ratio)
     clock = _lap(seconds, "phase", clock)
 
-    torus = Torus.from_ratio(ratio, area=surface.area)
+    problem = _core.GlideProblem(chart, reference, ratio)
+    angles, records, converged, reason = _finish(problem, angles, finish, max_iter, tol, progress)
+    history += records
+    _lap(seconds, "finish", clock)
+
+    if torus is None:
+        torus = Torus.from_ratio(ratio, area=surface.area)
     image = torus.xi(angles[:, 0], angles[:, 1])
-    figures = _measure(surface, chart, angles, image)
+    if not converged:
+        _log.warning("area map: %s", reason)
     return AreaMap(
         surface=surface,
         angles=read_only(angles),
@@ -171,23 +216,38 @@ def area_map(
         ratio=ratio,
         forms=conformal.forms,
         history=tuple(history),
-        distortion=figures,
-        converged=figures.flips == 0,
-        stop_reason="iterations done",
+        distortion=distortion(surface, image, angles=angles),
+        converged=converged,
+        stop_reason=reason,
         seconds=seconds,
     )
 
 
-def _check_options(phase: float | None, ratio: str | float, sem_iter: int) -> None:
+def _check_options(
+    torus: Torus | None,
+    phase: float | None,
+    ratio: str | float,
+    finish: str,
+    max_iter: int,
+    tol: float,
+    sem_iter: int,
+) -> None:
     if phase is not None and not math.isfinite(phase):
         raise OptionError(f"phase must be finite, got {phase}")
+    if torus is not None and ratio != "conformal":
+        raise OptionError("give the torus or the ratio of its radii, not both")
     if isinstance(ratio, str):
         if ratio not in ("conformal", "search"):
             raise OptionError(f"ratio must be 'conformal', 'search' or a number, got {ratio!r}")
     elif not (math.isfinite(ratio) and ratio > 1.0):
         raise OptionError(f"ratio R / r must be above 1 and finite, got {ratio}")
-    if sem_iter < 0:
-        raise OptionError(f"sem_iter must not be negative, got {sem_iter}")
+    if finish not in ("ring", "face", "none"):
+        raise OptionError(f"finish must be 'ring', 'face' or 'none', got {finish!r}")
+    if not (math.isfinite(tol) and tol > 0.0):
+        raise OptionError(f"tol must be positive, got {tol}")
+    for name, value in (("max_iter", max_iter), ("sem_iter", sem_iter)):
+        if value < 0:
+            raise OptionError(f"{name} must not be negative, got {value}")
 
 
 def _lap(seconds: dict[str, float], stage: str, start: float) -> float:
@@ -205,7 +265,12 @@ def _minimise_stretch(
 ) -> tuple[NDArray[np.float64], list[IterationRecord]]:
     """Steps of (4.5) in the chart until the energy is at its bound or stops falling."""
     start = time.perf_counter()
-    sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, conformal.turns)
+    turns = conformal.turns
+    if (_core.turn_areas(chart, turns) <= 0.0).any():
+        # Positive weights embed the surface in a flat torus whatever its triangles (Tutte).
+        weights = np.ones(len(surface.edges))
+        turns = _core.harmonic_forms(surface.topology, weights, conformal.forms.astype(float))[1]
+    sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, turns)
     history: list[IterationRecord] = []
     taken = None
     for iteration in range(max_iter + 1):
@@ -274,16 +339,74 @@ def _best(
     return candidates[int(np.argmin([quality.energy for quality in qualities]))]
 
 
-def _angles(turns: NDArray[np.float64], phase: float, ratio: float) -> NDArray[np.float64]:
-    """(u, v) in radians from (u, s) in turns."""
-    v = _core.angle_from_equal_area(TWO_PI * (turns[:, 1] + phase), 1.0 / ratio)
-    return np.column_stack([TWO_PI * turns[:, 0], v])
+def _angles(
+    chart: _core.SurfaceChart, turns: NDArray[np.float64], phase: float, ratio: float
+) -> NDArray[np.float64]:
+    """(u, v) in radians from (u, s) in turns, without flipped faces where there are none in (u, s).
+
+    Large faces can turn over when s is bent into v. Then it is bent less: v = s turns none.
+    """
+    s = TWO_PI * (turns[:, 1] + phase)
+    bend = 1.0 / ratio
+    while True:
+        v = _core.angle_from_equal_area(s, bend)
+        bent = np.column_stack([turns[:, 0], v / TWO_PI])
+        if bend == 0.0 or (_core.turn_areas(chart, bent) > 0.0).all():
+            return np.column_stack([TWO_PI * turns[:, 0], v])
+        bend = 0.8 * bend if bend > 0.01 else 0.0
 
 
-def _measure(
-    surface: TriMesh,
-    chart: _core.SurfaceChart,
+def _finish(
+    problem: _core.GlideProblem,
     angles: NDArray[np.float64],
-    image: NDArray[np.float64],
-) -> Distortion:
-    return distortion(surface, image, angles=angles)
+    finish: str,
+    max_iter: int,
+    tol: float,
+    progress: Progress | None,
+) -> tuple[NDArray[np.float64], list[IterationRecord], bool, str]:
+    """Newton steps on the polyhedral areas: angles, records, converged, reason."""
+    start = time.perf_counter()
+    newton = _core.SurfaceNewton(problem, angles)
+    history: list[IterationRecord] = []
+    weight, stalled, steps = 1.0, 0, 0 if finish == "none" else max_iter
+    taken = None
+    for iteration in range(steps + 1):
+        if iteration:
+            taken = newton.step(1.0, _SHAPE / weight, _CHART / weight)
+            stalled = 0 if taken.step > 0.0 else stalled + 1
+            weight *= _GROWTH if taken.step >= _FULL_STEP else 1.0
+        figures = newton.figures()
+        history.append(_record(iteration, taken, figures, start))
+        report(progress, "area", iteration, steps, face_sd=figures.face_sd)
+        reached = figures.face_sd <= tol and figures.face_error <= _RATIO_GOAL * tol
+        if reached or stalled == _STALLED:
+            break
+    reason = "areas within tol" if reached else f"no further step, face SD {figures.face_sd:.2e}"
+    if not reached and stalled < _STALLED:
+        reason = f"{steps} steps done, face SD {figures.face_sd:.2e} above tol {tol:.2e}"
+    if finish == "ring":
+        if newton.project_rings(1.0, _SHAPE / weight, _CHART / weight, tol):
+            reason += ", rings exact"
+            history.append(_record(len(history), None, newton.figures(), start))
+        else:
+            reason += ", rings left as they are"
+    return newton.angles, history, reached, reason
+
+
+def _record(
+    iteration: int,
+    taken: _core.GlideStep | None,
+    figures: _core.SurfaceFigures,
+    start: float,
+) -> IterationRecord:
+    return IterationRecord(
+        stage="newton",
+        iteration=iteration,
+        energy=math.nan if taken is None else taken.after,
+        step=math.nan if taken is None else taken.step,
+        residual=math.nan if taken is None else taken.decrement,
+        flips=figures.flips,
+        ring_sd=figures.ring_sd,
+        element_sd=figures.face_sd,
+        seconds=time.perf_counter() - start,
+    )

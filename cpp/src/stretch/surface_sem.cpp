@@ -87,14 +87,12 @@ SurfaceFigures SurfaceSem::figures() const {
   SurfaceFigures figures;
   figures.energy = image.array().square().cwiseQuotient(areas_.array()).sum();
   figures.flips = static_cast<Index>((image.array() <= 0.0).count());
-  const Eigen::Vector2d sd = ratio_deviations(chart_.faces, chart_.n_vertices, areas_, image);
-  figures.ring_sd = sd(0);
-  figures.face_sd = sd(1);
+  ratio_figures(chart_.faces, chart_.n_vertices, areas_, image, figures);
   return figures;
 }
 
-Eigen::Vector2d ratio_deviations(const FacesRef& faces, Index n_vertices, const VecRef& source,
-                                 const VecRef& image) {
+void ratio_figures(const FacesRef& faces, Index n_vertices, const VecRef& source,
+                   const VecRef& image, SurfaceFigures& figures) {
   const auto deviation = [](const Eigen::ArrayXd& ratio) {
     return std::sqrt((ratio - ratio.mean()).square().mean());
   };
@@ -104,7 +102,10 @@ Eigen::Vector2d ratio_deviations(const FacesRef& faces, Index n_vertices, const 
       from(faces(f, k)) += source(f);
       to(faces(f, k)) += image(f);
     }
-  return {deviation(to / from), deviation(image.array() / source.array())};
+  const Eigen::ArrayXd ratio = image.array() / source.array();
+  figures.ring_sd = deviation(to / from);
+  figures.face_sd = deviation(ratio);
+  figures.face_error = (ratio - 1.0).abs().maxCoeff();
 }
 
 }  // namespace stretchmap

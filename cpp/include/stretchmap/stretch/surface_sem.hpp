@@ -13,10 +13,11 @@
 namespace stretchmap {
 
 struct SurfaceFigures {
-  double energy = 0.0;   // of what is minimised
-  Index flips = 0;       // faces with no or negative area in the chart
-  double ring_sd = 0.0;  // standard deviation of the area ratios of vertex rings (6.3)
-  double face_sd = 0.0;  // and of faces
+  double energy = 0.0;      // of what is minimised
+  Index flips = 0;          // faces with no or negative area in the chart
+  double ring_sd = 0.0;     // standard deviation of the area ratios of vertex rings (6.3)
+  double face_sd = 0.0;     // and of faces
+  double face_error = 0.0;  // largest |ratio - 1| of a face
 };
 
 struct SemStep {
@@ -47,9 +48,8 @@ class SurfaceSem {
   std::optional<SpdSolver> solver_;  // from the first step on
 };
 
-// Standard deviation of the ring ratios (6.3) and of the face ratios, from shares of the total area
-// (each sums to one): (ring, face).
-Eigen::Vector2d ratio_deviations(const FacesRef& faces, Index n_vertices, const VecRef& source,
-                                 const VecRef& image);
+// Fills in ring_sd, face_sd and face_error from shares of the total area (each sums to one).
+void ratio_figures(const FacesRef& faces, Index n_vertices, const VecRef& source,
+                   const VecRef& image, SurfaceFigures& figures);
 
 }  // namespace stretchmap

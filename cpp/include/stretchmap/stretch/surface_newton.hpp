@@ -1,0 +1,52 @@
+// Projected Newton steps on the energy of a surface gliding on the torus. No step is accepted that
+// turns a face over in the chart or raises the energy.
+#pragma once
+
+#include <optional>
+
+#include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/stretch/surface_energy.hpp"
+#include "stretchmap/stretch/surface_pattern.hpp"
+#include "stretchmap/stretch/surface_sem.hpp"
+
+namespace stretchmap {
+
+struct GlideStep {
+  double before = 0.0;     // energy with this step's weights and scale, before
+  double after = 0.0;      // and after the step
+  double step = 0.0;       // fraction of the Newton step taken, 0: none decreases the energy
+  double decrement = 0.0;  // Newton decrement g' H^-1 g
+};
+
+class SurfaceNewton {
+ public:
+  // areas of `problem` as surface_reference gives them; angles (n, 2) without flipped faces.
+  // \throws Error "SolverError" if a face is flipped in the chart (ids: faces).
+  SurfaceNewton(GlideProblem problem, Points2 angles);
+
+  // The scale of the areas is renewed first, which lowers the energy by itself.
+  GlideStep step(const SurfaceWeights& weights);
+
+  // Makes the ring areas exact by steps along ring_step, first the best ones, then the shortest.
+  // Refused (false, nothing changed) if that cannot be done or raises the deviation of the faces
+  // above both what it was and face_goal.
+  bool project_rings(const SurfaceWeights& weights, double face_goal);
+
+  // Areas of rings and faces on the polyhedral image; `energy` is E_S / (its bound).
+  SurfaceFigures figures() const;
+  const Points2& angles() const { return angles_; }
+  const GlideProblem& problem() const { return problem_; }
+
+ private:
+  void factorise(const Rows& hessians);
+  void assemble(const Rows& hessians, SparseMatrix& matrix) const;
+  double longest_step(const Points2& direction) const;
+
+  GlideProblem problem_;
+  Points2 angles_;
+  SurfacePattern pattern_;
+  std::optional<SurfacePattern> ring_pattern_;
+  std::optional<SpdSolver> solver_;  // from the first step on
+};
+
+}  // namespace stretchmap

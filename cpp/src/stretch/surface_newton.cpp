@@ -1,0 +1,138 @@
+#include "stretchmap/stretch/surface_newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "stretchmap/base/errors.hpp"
+#include "stretchmap/stretch/line_roots.hpp"
+#include "stretchmap/stretch/surface_rings.hpp"
+
+namespace stretchmap {
+
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586476925287;
+constexpr double kArmijo = 1e-4;
+constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
+constexpr int kRingSteps = 4;        // of each kind
+constexpr int kHalvings = 30;
+constexpr double kRidge = 1e-9;  // of the mean diagonal: holds the rotation about the axis
+
+Points2 as_rows(const Vec& vector) {
+  return Eigen::Map<const Points2>(vector.data(), vector.size() / 2, 2);
+}
+
+std::vector<Index> flipped(const GlideProblem& problem, const Points2& angles) {
+  const Vec areas = turn_areas(problem.chart, angles / kTwoPi);
+  std::vector<Index> faces;
+  for (Index f = 0; f < areas.size(); ++f)
+    if (!(areas(f) > 0.0)) faces.push_back(f);
+  return faces;
+}
+
+}  // namespace
+
+SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
+    : problem_(std::move(problem)),
+      angles_(std::move(angles)),
+      pattern_(problem_.chart.faces, problem_.chart.n_vertices, 2) {
+  const std::vector<Index> faces = flipped(problem_, angles_);
+  if (!faces.empty())
+    throw Error("SolverError", "faces are flipped in the chart; Newton steps need a start without",
+                faces);
+}
+
+GlideStep SurfaceNewton::step(const SurfaceWeights& weights) {
+  const double scale = best_scale(problem_, angles_);
+  const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
+  factorise(here.hessians);
+  Rows solution = Rows::Zero(here.gradient.size(), 1);
+  solver_->solve(-here.gradient, solution, {1e-6, 3, false});
+  const Vec flat = solution.col(0);
+  const Points2 direction = as_rows(flat);
+
+  const double slope = here.gradient.dot(flat);
+  GlideStep result{here.value, here.value, 0.0, -slope};
+  double t = longest_step(direction);
+  for (int halving = 0; halving < kHalvings; ++halving, t *= 0.5) {
+    const Points2 trial = angles_ + t * direction;
+    const double value = glide_energy(problem_, weights, scale, trial, Derivatives::kNone).value;
+    if (!(value <= here.value + kArmijo * t * slope) || !flipped(problem_, trial).empty()) continue;
+    angles_ = trial;
+    result.after = value;
+    result.step = t;
+    break;
+  }
+  return result;
+}
+
+void SurfaceNewton::factorise(const Rows& hessians) {
+  if (!solver_) {
+    SparseMatrix matrix = pattern_.zeros();
+    assemble(hessians, matrix);
+    solver_.emplace(std::move(matrix), SpdOptions{"direct"});
+    return;
+  }
+  assemble(hessians, solver_->matrix());
+  solver_->refactor();
+}
+
+void SurfaceNewton::assemble(const Rows& hessians, SparseMatrix& matrix) const {
+  pattern_.scatter(hessians, matrix.valuePtr());
+  const Vec diagonal = matrix.diagonal();
+  const double ridge = kRidge * diagonal.mean();
+  for (Index i = 0; i < matrix.rows(); ++i) matrix.coeffRef(i, i) += ridge;
+}
+
+// At most 1, and at most nine tenths of the way to the first face of no area in the (u, v) chart.
+double SurfaceNewton::longest_step(const Points2& direction) const {
+  const Points2 turns = angles_ / kTwoPi, change = direction / kTwoPi;
+  SurfaceChart loops = problem_.chart;
+  loops.shift_u.setZero();
+  loops.shift_v.setZero();
+  const Vec now = turn_areas(problem_.chart, turns);
+  const Vec quadratic = turn_areas(loops, change);
+  const Vec linear = turn_areas(problem_.chart, turns + change) - now - quadratic;
+  double longest = 1.0;
+  for (Index f = 0; f < now.size(); ++f)
+    longest = std::min(longest, 0.9 * first_root(now(f), linear(f), quadratic(f)));
+  return longest;
+}
+
+bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_goal) {
+  if (!ring_pattern_) ring_pattern_.emplace(problem_.chart.faces, problem_.chart.n_vertices, 3);
+  const Points2 start = angles_;
+  const SurfaceFigures before = figures();
+  SurfaceFigures now = before;
+  for (const RingStep kind : {RingStep::kBest, RingStep::kSmallest})
+    for (int step = 0; step < kRingSteps && now.ring_sd > kRingGoal; ++step) {
+      const Points2 last = angles_;
+      const Points2 direction = ring_step(*ring_pattern_, problem_, weights,
+                                          best_scale(problem_, angles_), angles_, kind);
+      angles_ += std::min(1.0, longest_step(direction)) * direction;
+      const SurfaceFigures next = figures();
+      if (!(next.flips == 0 && next.ring_sd < 0.9 * now.ring_sd)) {
+        angles_ = last;
+        break;
+      }
+      now = next;
+    }
+  if (now.ring_sd <= kRingGoal && now.face_sd <= std::max(before.face_sd, face_goal)) return true;
+  angles_ = start;
+  return false;
+}
+
+SurfaceFigures SurfaceNewton::figures() const {
+  Vec areas = glide_areas(problem_, angles_);
+  const double total = areas.sum();
+  areas /= total;
+  SurfaceFigures figures;
+  const Vec& source = problem_.reference.areas;
+  figures.energy = (areas.array().square() / source.array()).sum();
+  figures.flips = static_cast<Index>(flipped(problem_, angles_).size());
+  ratio_figures(problem_.chart.faces, problem_.chart.n_vertices, source, areas, figures);
+  return figures;
+}
+
+}  // namespace stretchmap

@@ -1,0 +1,112 @@
+#include "stretchmap/stretch/surface_rings.hpp"
+
+#include <Eigen/SparseCholesky>
+#include <cmath>
+#include <vector>
+
+#include "face_jet.hpp"
+#include "stretchmap/base/errors.hpp"
+
+namespace stretchmap {
+
+namespace {
+
+// The shares sum to one, so one equation follows from the others: a little give in each of them
+// makes the system quasi-definite, and then it has a factorisation in any order.
+constexpr double kGive = 1e-10;
+
+struct Rings {
+  Vec source, image;  // (n) areas of the rings
+  Rows gradients;     // (m, 6) of the face areas
+  double total = 0.0;
+};
+
+Rings measure(const GlideProblem& problem, const Points2Ref& angles) {
+  const Faces& faces = problem.chart.faces;
+  const Index n = problem.chart.n_vertices;
+  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  Rings rings{Vec::Zero(n), Vec::Zero(n), Rows(faces.rows(), 6), 0.0};
+  for (Index f = 0; f < faces.rows(); ++f) {
+    TorusPoint p[3];
+    for (int k = 0; k < 3; ++k) p[k] = points[faces(f, k)];
+    const Jet area = area_jet(p, false);
+    rings.gradients.row(f) = area.gradient;
+    rings.total += area.value;
+    for (int k = 0; k < 3; ++k) {
+      rings.source(faces(f, k)) += problem.reference.areas(f);
+      rings.image(faces(f, k)) += area.value;
+    }
+  }
+  return rings;
+}
+
+// Half the squared length of a change, each vertex counted once per face: derivatives at zero.
+GlideEnergy squared_length(const GlideProblem& problem, const Points2Ref& angles) {
+  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  const Faces& faces = problem.chart.faces;
+  GlideEnergy energy{0.0, Vec::Zero(angles.size()), Rows::Zero(faces.rows(), 36)};
+  for (Index f = 0; f < faces.rows(); ++f)
+    for (int k = 0; k < 3; ++k)
+      for (int c = 0; c < 2; ++c)
+        energy.hessians(f, 7 * (2 * k + c)) = points[faces(f, k)].tangent.col(c).squaredNorm();
+  return energy;
+}
+
+// Faces' parts of the system, rows and columns ordered (u, v, multiplier) corner by corner.
+Rows elements(const GlideProblem& problem, const Rings& rings, const Rows& hessians) {
+  using NineNine = Eigen::Matrix<double, 9, 9>;
+  Rows blocks(hessians.rows(), 81);
+  for (Index f = 0; f < hessians.rows(); ++f) {
+    const Eigen::Map<const Eigen::Matrix<double, 6, 6>> hessian(hessians.row(f).data());
+    NineNine block = NineNine::Zero();
+    for (int j = 0; j < 3; ++j) {
+      const double weight = 1.0 / (rings.total * rings.source(problem.chart.faces(f, j)));
+      for (int k = 0; k < 3; ++k) {
+        block.block<2, 2>(3 * j, 3 * k) = hessian.block<2, 2>(2 * j, 2 * k);
+        const Eigen::RowVector2d row = weight * rings.gradients.row(f).segment<2>(2 * k);
+        block.block<1, 2>(3 * j + 2, 3 * k) = row;
+        block.block<2, 1>(3 * k, 3 * j + 2) = row.transpose();
+      }
+    }
+    Eigen::Map<NineNine>(blocks.row(f).data()) = block;
+  }
+  return blocks;
+}
+
+}  // namespace
+
+Points2 ring_step(const SurfacePattern& pattern, const GlideProblem& problem,
+                  const SurfaceWeights& weights, double scale, const Points2Ref& angles,
+                  RingStep kind) {
+  const Index n = problem.chart.n_vertices;
+  const Rings rings = measure(problem, angles);
+  const GlideEnergy energy =
+      kind == RingStep::kBest ? glide_energy(problem, weights, scale, angles, Derivatives::kModel)
+                              : squared_length(problem, angles);
+  SparseMatrix matrix = pattern.zeros();
+  pattern.scatter(elements(problem, rings, energy.hessians), matrix.valuePtr());
+  Vec diagonal = matrix.diagonal();
+  const double size = diagonal.sum() / (2.0 * n);
+  double coupling = 0.0;
+  for (Index i = 2; i < 3 * n; i += 3) coupling += matrix.row(i).squaredNorm() / n;
+  Vec right(3 * n);
+  for (Index i = 0; i < n; ++i) {
+    matrix.coeffRef(3 * i, 3 * i) += kGive * size;
+    matrix.coeffRef(3 * i + 1, 3 * i + 1) += kGive * size;
+    matrix.coeffRef(3 * i + 2, 3 * i + 2) = -kGive * coupling / size;
+    right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
+    right(3 * i + 2) = 1.0 - rings.image(i) / (rings.total * rings.source(i));
+  }
+  using Columns = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
+  const Columns columns = matrix;
+  const Eigen::SimplicialLDLT<Columns> factor(columns);
+  if (factor.info() != Eigen::Success)
+    throw Error("SolverError", "the equations for exact ring areas are singular");
+  Vec solution = factor.solve(right);
+  solution += factor.solve(right - matrix * solution);
+  Points2 change(n, 2);
+  for (Index i = 0; i < n; ++i) change.row(i) = solution.segment<2>(3 * i).transpose();
+  return change;
+}
+
+}  // namespace stretchmap
