@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "convergence_watch.hpp"
 #include "multigrid.hpp"
 #include "ordering.hpp"
 #include "parallel.hpp"
@@ -42,6 +43,7 @@ struct BlockSolver::State {
   Rows modes;                  // multigrid: three or six columns, zero in rows that do not exist
   std::vector<Index> order;    // multigrid: order[new] = old
   bool hierarchy = false;
+  ConvergenceWatch watch;
   Multigrid<3, 3> translations_only;
   Multigrid<3, 6> rigid;
 
@@ -121,7 +123,7 @@ void BlockSolver::State::invert_diagonal() {
     throw Error("SolverError",
                 "the diagonal block of vertex " + std::to_string(bad[0]) +
                     " is missing or not positive definite",
-                std::move(bad));
+                bad);
 }
 
 template <class Hierarchy>
@@ -131,7 +133,7 @@ void BlockSolver::State::factor(Hierarchy& multigrid) {
     multigrid.finest().set_pattern(A.rows(), A.row_ptr.data(), A.col.data(), order);
   }
   multigrid.finest().set_values(A.values.data());
-  if (hierarchy) {
+  if (hierarchy && !watch.worn()) {
     multigrid.refresh();
     return;
   }
@@ -140,8 +142,8 @@ void BlockSolver::State::factor(Hierarchy& multigrid) {
   for (std::size_t i = 0; i < order.size(); ++i)
     std::copy_n(modes.data() + width * order[i], width, ordered.data() + width * i);
   multigrid.setup(ordered);
-  modes.resize(0, modes.cols());
   hierarchy = true;
+  watch.reset();
 }
 
 void BlockSolver::refactor() {
@@ -182,7 +184,9 @@ PcgResult<1> BlockSolver::State::solve(const double* b, double* x,
   } else {
     use(rigid);
   }
-  return pcg<1>(system, b, x, solve_options, poll);
+  const PcgResult<1> result = pcg<1>(system, b, x, solve_options, poll);
+  watch.observe(result.iterations, result.digits);
+  return result;
 }
 
 SolveReport BlockSolver::solve(const PointsRef& b, Eigen::Ref<Points> x,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "parallel.hpp"
 
@@ -106,6 +107,10 @@ struct Run {
         if (rr[k] <= goal[k]) continue;  // this column is done and rests
         if (pq[k] <= 0.0 || rz[k] <= 0.0) {
           result.negative_curvature = true;
+          alpha = {};
+          // At the very first step there is no iterate to keep: the preconditioned gradient.
+          if (result.iterations == 0 && rz[k] > 0.0) alpha[k] = 1.0;
+          advance<K>(n, alpha, p.data(), q.data(), x, r.data());
           return;
         }
         alpha[k] = rz[k] / pq[k];
@@ -144,6 +149,7 @@ PcgResult<K> pcg(const PcgSystem& system, const double* b, double* x, const Solv
   }
   // The recursive residual drifts from the true one; a restart from the true one closes the gap.
   run.true_residual();
+  const Scalars<K> first = run.rr;
   for (int restart = 0; restart < 4 && run.result.finite && !run.reached(); ++restart) {
     const int before = run.result.iterations;
     run.iterate(options.max_iter, poll);
@@ -151,8 +157,12 @@ PcgResult<K> pcg(const PcgSystem& system, const double* b, double* x, const Solv
     run.true_residual();
     if (run.result.negative_curvature || run.result.iterations == before) break;
   }
-  for (int k = 0; k < K; ++k)
+  run.result.digits = std::numeric_limits<double>::max();
+  for (int k = 0; k < K; ++k) {
     run.result.residual[k] = bb[k] > 0.0 ? std::sqrt(run.rr[k] / bb[k]) : 0.0;
+    if (first[k] > run.goal[k] && run.rr[k] > 0.0)
+      run.result.digits = std::min(run.result.digits, 0.5 * std::log10(first[k] / run.rr[k]));
+  }
   return run.result;
 }
 

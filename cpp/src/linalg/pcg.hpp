@@ -22,6 +22,7 @@ template <int K>
 struct PcgResult {
   int iterations = 0;
   std::array<double, K> residual{};  // true relative residual
+  double digits = 0.0;               // decimal digits gained by the slowest column
   bool negative_curvature = false;   // p'Ap <= 0 was met: the iterate before it is returned
   bool finite = true;                // false: a NaN or an infinity was met
 };

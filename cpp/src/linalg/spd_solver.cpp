@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "cholesky.hpp"
+#include "convergence_watch.hpp"
 #include "multigrid.hpp"
 #include "ordering.hpp"
 #include "parallel.hpp"
@@ -17,11 +18,13 @@ namespace {
 
 using namespace linalg;
 
-// A triangulated surface has 7 entries per row, a tetrahedral mesh 15: their fill differs as much.
+// A triangulated surface has 7 entries per row, a tetrahedral mesh up to 15; the fill of their
+// factors differs far more. The limits are where a factorisation costs as much as a multigrid
+// solve.
 std::string choose_backend(const SparseMatrix& A) {
   const double density = static_cast<double>(A.nonZeros()) / std::max<double>(1.0, A.rows());
   const bool surface = density < 9.0;
-  return A.rows() <= (surface ? 400000 : 3000) ? "direct" : "multigrid";
+  return A.rows() <= (surface ? 30000 : 4000) ? "direct" : "multigrid";
 }
 
 // The inverse diagonal; its rows must be positive for any backend.
@@ -34,7 +37,7 @@ Vec inverse_diagonal(const SparseMatrix& A) {
     throw Error("SolverError",
                 "the matrix is not positive definite: row " + std::to_string(bad[0]) +
                     " has a diagonal entry that is not a positive number",
-                std::move(bad));
+                bad);
   return diagonal.cwiseInverse();
 }
 
@@ -71,6 +74,7 @@ struct SpdSolver::State {
   std::vector<Index> order;  // multigrid: order[new] = old
   Multigrid<1, 1> multigrid;
   bool hierarchy = false;
+  ConvergenceWatch watch;
 
   void factor_multigrid();
   template <int K>
@@ -114,17 +118,19 @@ void SpdSolver::refactor() {
 }
 
 void SpdSolver::State::factor_multigrid() {
+  const Index n = static_cast<Index>(A.rows());
   if (!hierarchy) {
-    const Index n = static_cast<Index>(A.rows());
     order = breadth_first_order(n, A.outerIndexPtr(), A.innerIndexPtr());
     multigrid.finest().set_pattern(n, A.outerIndexPtr(), A.innerIndexPtr(), order);
   }
   multigrid.finest().set_values(A.valuePtr());
-  if (hierarchy)
+  if (hierarchy && !watch.worn()) {
     multigrid.refresh();
-  else
-    multigrid.setup(std::vector<double>(order.size(), 1.0));
+    return;
+  }
+  multigrid.setup(std::vector<double>(order.size(), 1.0));
   hierarchy = true;
+  watch.reset();
 }
 
 template <int K>
@@ -157,7 +163,9 @@ PcgResult<K> SpdSolver::State::iterative(const double* b, double* x, const Solve
   const PcgSystem system{
       n, [&](const double* in, double* out) { multigrid.finest().multiply<K>(in, out); },
       [&](const double* in, double* out) { multigrid.precondition<K>(in, out); }};
-  return pcg<K>(system, b, x, options, poll);
+  const PcgResult<K> result = pcg<K>(system, b, x, options, poll);
+  watch.observe(result.iterations, result.digits);
+  return result;
 }
 
 // Solves for K columns from `first` on, those beyond the last one being zero.

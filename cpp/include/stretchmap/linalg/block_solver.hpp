@@ -54,9 +54,9 @@ class BlockSolver {
   // After matrix().values changed (same pattern): renews numbers on the old hierarchy.
   void refactor();
 
-  // Solves A x = b for b (n, 3), from x (n, 3). If a direction of negative curvature turns up, the
-  // last iterate before it is kept (from x = 0 it is a descent direction for b = -gradient, or b
-  // itself preconditioned if it happens at the first step) and the report says so; this is no
+  // Solves A x = b for b (n, 3), from x (n, 3). Should a direction of negative curvature turn up,
+  // the last iterate before it is kept, and at the first step x plus the preconditioned residual:
+  // from x = 0 and with b = -gradient either is a descent direction. The report says so; it is no
   // error. \throws SolverError if a value is not finite or (must_converge) the goal is not reached.
   SolveReport solve(const PointsRef& b, Eigen::Ref<Points> x, const SolveOptions& options = {},
                     const Poll& poll = {});
