@@ -1,0 +1,7 @@
+"""``python -m stretchmap.cli``."""
+
+import sys
+
+from . import main
+
+sys.exit(main())

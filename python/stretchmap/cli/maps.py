@@ -1,0 +1,258 @@
+"""Commands that compute or judge maps: conformal, area, volume, certify."""
+
+from __future__ import annotations
+
+import logging
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from . import _common as common
+from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet
+
+if TYPE_CHECKING:
+    from ..certificate import Certificate
+    from ..mesh import TetMesh
+    from ..results import LoadedMap, MapResult
+
+_log = logging.getLogger("stretchmap")
+
+
+class Method(str, Enum):
+    """Values of ``--method``."""
+
+    certified = "certified"
+    vsem = "vsem"
+
+
+class Boundary(str, Enum):
+    """Values of ``--boundary``."""
+
+    glide = "glide"
+    frozen = "frozen"
+
+
+class Solver(str, Enum):
+    """Values of ``--solver``."""
+
+    auto = "auto"
+    direct = "direct"
+    multigrid = "multigrid"
+    jacobi = "jacobi"
+
+
+Ratio = Annotated[
+    str | None,
+    typer.Option(help="R / r of the torus: conformal, search or a number.", show_default=False),
+]
+Phase = Annotated[
+    float | None,
+    typer.Option(help="Turns around the tube; searched if left out.", show_default=False),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this module."""
+    for command in (conformal, area, volume, certify):
+        app.command()(command)
+
+
+def conformal(
+    input: Input,
+    output: Output,
+    json: Json = None,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> None:
+    """Map a surface of genus one, or a solid's boundary, conformally onto a torus."""
+    from ..conformal import conformal_map
+
+    common.check_outputs(output, common.map_suffixes(), json, input)
+    watch = common.Stopwatch()
+    surface = common.surface_of(common.read_mesh(input, orient, compact))
+    watch.lap("read")
+    finish(conformal_map(surface), output, json, quiet, watch)
+
+
+def area(
+    input: Input,
+    output: Output,
+    ratio: Ratio = None,
+    phase: Phase = None,
+    json: Json = None,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> None:
+    """Map a surface of genus one, or a solid's boundary, onto a torus, areas preserved."""
+    from ..area import area_map
+    from ..progress import terminal
+
+    common.check_outputs(output, common.map_suffixes(), json, input)
+    watch = common.Stopwatch()
+    options = {"ratio": parsed_ratio(ratio), "phase": phase}
+    options = {name: value for name, value in options.items() if value is not None}
+    surface = common.surface_of(common.read_mesh(input, orient, compact))
+    watch.lap("read")
+    with terminal(quiet) as bar:
+        result = area_map(surface, **options, progress=bar)
+    finish(result, output, json, quiet, watch)
+
+
+def volume(
+    input: Input,
+    output: Output,
+    method: Annotated[
+        Method | None,
+        typer.Option(help="certified (default) or, the default with --c, vsem (Algorithm 5.1)."),
+    ] = None,
+    boundary: Annotated[
+        Boundary | None, typer.Option(help="Let boundary vertices glide (default) or freeze them.")
+    ] = None,
+    c: Annotated[
+        float | None, typer.Option("--c", help="Regularisation (5.6) of vsem, dimensionless.")
+    ] = None,
+    max_iter: Annotated[int | None, typer.Option(help="Most steps.", show_default=False)] = None,
+    tol: Annotated[
+        float | None,
+        typer.Option(help="Stop when a step lowers the energy by no more than this share."),
+    ] = None,
+    ratio: Ratio = None,
+    phase: Phase = None,
+    start: Annotated[
+        Path | None, typer.Option(help="Go on from this map file of the same solid.")
+    ] = None,
+    refine: Annotated[
+        bool, typer.Option(help="Split interior edges and faces the boundary alone decides about.")
+    ] = True,
+    keep_best: Annotated[
+        bool, typer.Option(help="Write the best map even if it is not certified; exit code 1.")
+    ] = False,
+    solver: Annotated[Solver, typer.Option(help="Linear solver.")] = Solver.auto,
+    json: Json = None,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> int:
+    """Map a solid torus onto the standard one, volumes preserved and no tet flipped."""
+    from ..progress import terminal
+    from ..results import load_map
+    from ..volume import volume_map
+
+    common.check_outputs(output, common.map_suffixes(), json, input)
+    watch = common.Stopwatch()
+    options: dict[str, Any] = {
+        "method": None if method is None else method.value,
+        "boundary": None if boundary is None else boundary.value,
+        "ratio": parsed_ratio(ratio),
+        "solver": solver.value,
+    }
+    solid = common.require_solid(common.read_mesh(input, orient, compact), input, "volume")
+    if start is not None:
+        solid, options["start"], options["torus"] = resumed(solid, load_map(start), start)
+    watch.lap("read")
+    with terminal(quiet) as bar:
+        result = volume_map(
+            solid, c=c, max_iter=max_iter, tol=tol, phase=phase, refine=refine,
+            keep_best=keep_best, progress=bar, **options,
+        )  # fmt: skip
+    finish(result, output, json, quiet, watch)
+    if result.method == "certified" and not result.certificate.certified:
+        _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
+        return 1
+    return 0
+
+
+def certify(
+    map_file: MapFile,
+    torus: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="R r", help="Radii, if the file names none.", show_default=False),
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(help="Largest distance of the boundary from the torus, over r.")
+    ] = 1e-9,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> int:
+    """Prove that the map in a file, whoever wrote it, is a bijection; exit code 1 if it is not."""
+    from ..certificate import certify_file
+    from ..results import versions
+    from ..torus import Torus
+
+    if json is not None:
+        common.check_output(json, (json.suffix.lower(),), map_file)
+    certificate = certify_file(
+        map_file, None if torus is None else Torus(*torus), tolerance=tolerance
+    )
+    common.write_json(json, {**certificate.to_dict(), "versions": versions()})
+    if not quiet:
+        typer.echo(certificate.summary())
+    if not certificate.certified:
+        _log.error("not certified: %s", certificate.reason)
+        return 1
+    return 0
+
+
+def parsed_ratio(ratio: str | None) -> str | float | None:
+    """``--ratio`` as the library takes it: a number where it is one."""
+    try:
+        return None if ratio is None else float(ratio)
+    except ValueError:
+        return ratio
+
+
+def resumed(solid: TetMesh, loaded: LoadedMap, path: Path) -> tuple[TetMesh, Any, Any]:
+    """Solid, image and torus to go on from.
+
+    A map file holds the mesh that was mapped: where the input had to be refined, its refinement,
+    whose first vertices are those of the input. Then that mesh is gone on with.
+    """
+    import numpy as np
+
+    from ..errors import MeshError
+
+    n = solid.n_vertices
+    if loaded.solid is None or loaded.torus is None:
+        raise MeshError(f"{path} is no map of a solid onto a solid torus with known radii")
+    if not np.array_equal(loaded.solid.V[:n], solid.V):
+        raise MeshError(f"{path} is not a map of this solid: its vertices are others")
+    if loaded.solid.n_vertices == n and not np.array_equal(loaded.solid.T, solid.T):
+        raise MeshError(f"{path} is not a map of this solid: its tets are others")
+    return loaded.solid, loaded.image, loaded.torus
+
+
+def finish(
+    result: MapResult, output: Path, json_path: Path | None, quiet: bool, watch: common.Stopwatch
+) -> None:
+    """Certify if that has not been done, write output and report, print the table."""
+    from .._output import table
+
+    certificate = getattr(result, "certificate", None)
+    watch.lap("compute")
+    if certificate is None:
+        certificate = _certified(result)
+        watch.lap("certificate")
+    report = result.to_dict(history=True)
+    report["certified"] = certificate.certified
+    report["reason"] = certificate.reason
+    report["certificate"] = certificate.to_dict()
+    report["seconds"] = {**watch.seconds, **report["seconds"]}
+    common.write_together(output, result.save, json_path, report)
+    if not quiet:
+        nested = ("seconds", "torus", "versions", "certificate", "history")
+        rows = {name: value for name, value in report.items() if name not in nested}
+        if result.torus is not None:
+            rows["torus"] = f"R = {result.torus.R:.6g}, r = {result.torus.r:.6g}"
+        rows |= {f"seconds, {stage}": value for stage, value in report["seconds"].items()}
+        typer.echo(table(rows))
+        typer.echo(f"written to {output}")
+
+
+def _certified(result: MapResult) -> Certificate:
+    from ..certificate import certify
+
+    return certify(result.mesh, result.image, result.torus)

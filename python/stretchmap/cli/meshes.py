@@ -1,0 +1,132 @@
+"""Commands about meshes: info, homology, tet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from . import _common as common
+from ._common import Compact, Input, Json, Orient, Output, Quiet
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this module."""
+    app.command()(info)
+    app.command()(homology)
+    app.command()(tet)
+
+
+def info(
+    input: Input,
+    json: Json = None,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> None:
+    """Describe a mesh and list every defect."""
+    from ..errors import MeshError
+    from ..mesh import TetMesh
+    from ..results import versions
+
+    if json is not None:
+        common.check_output(json, (json.suffix.lower(),), input)
+    mesh = common.read_mesh(input, orient, compact)
+    solid = isinstance(mesh, TetMesh)
+    diagnosis = mesh.diagnose()
+    try:
+        mesh.require_solid_torus() if solid else mesh.require_genus_one()
+        obstacle = ""
+    except MeshError as error:
+        obstacle = str(error)
+    report: dict[str, Any] = {
+        "kind": diagnosis.kind,
+        "n_vertices": mesh.n_vertices,
+        "n_elements": diagnosis.n_elements,
+        "n_components": diagnosis.n_components,
+        "euler": int(diagnosis.euler.sum()),
+        "genus": diagnosis.genus.tolist(),
+        "volume": mesh.volume,
+        "bounding_box": [mesh.V.min(axis=0).tolist(), mesh.V.max(axis=0).tolist()],
+        "defects": [
+            {"name": d.name, "message": d.message, "ids": list(d.ids)} for d in diagnosis.defects
+        ],
+        "n_turned": mesh.n_turned,
+        "usable": not obstacle,
+        "reason": obstacle,
+        "versions": versions(),
+    }
+    if not quiet:
+        size = f"volume {mesh.volume:.6g}" if solid else f"area {mesh.area:.6g}"
+        typer.echo(diagnosis.summary())
+        typer.echo(size)
+        typer.echo(f"can be mapped to the torus: {'no' if obstacle else 'yes'}")
+    common.write_json(json, report)
+
+
+def homology(
+    input: Input,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="File (.npz) for loops and forms.", show_default=False),
+    ] = None,
+    json: Json = None,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find generators, handle and tunnel loops of a surface of any genus, or of a solid's."""
+    from ..homology import homology_basis
+    from ..mesh import TetMesh
+    from ..results import versions
+
+    if output is not None:
+        common.check_outputs(output, (".npz",), json, input)
+    elif json is not None:
+        common.check_output(json, (json.suffix.lower(),), input)
+    watch = common.Stopwatch()
+    mesh = common.read_mesh(input, orient, compact)
+    surface = common.surface_of(mesh)
+    watch.lap("read")
+    basis = homology_basis(surface, mesh if isinstance(mesh, TetMesh) else None)
+    report = basis.to_dict()
+    watch.lap("homology")
+    if not quiet:
+        typer.echo(basis.summary())
+    report |= {"seconds": watch.seconds, "versions": versions()}
+    if output is None:
+        common.write_json(json, report)
+    else:
+        common.write_together(output, basis.save, json, report)
+
+
+def tet(
+    input: Input,
+    output: Output,
+    max_volume: Annotated[
+        float | None, typer.Option(help="Largest tet volume aimed at.", show_default=False)
+    ] = None,
+    quality: Annotated[
+        float, typer.Option(help="Largest ratio of circumradius to shortest edge aimed at.")
+    ] = 1.4,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fill a closed surface with tets, keeping the surface as it is."""
+    from .. import io
+    from ..errors import MeshError
+    from ..mesh import TetMesh
+    from ..samples import tetrahedralise
+
+    common.check_output(output, io.suffixes(solid=True), input)
+    common.require_package("tetgen", "filling a surface with tets", "mesh")
+    surface = common.read_mesh(input, orient, compact)
+    if isinstance(surface, TetMesh):
+        raise MeshError(f"{input} is a solid already")
+    surface.require_closed()
+    solid = tetrahedralise(surface, max_volume, quality)
+    io.write(output, solid)
+    if not quiet:
+        typer.echo(solid.diagnose().summary())
