@@ -1,5 +1,6 @@
 #include "arrays.hpp"
 #include "stretchmap/stretch/rest_shape.hpp"
+#include "stretchmap/stretch/ring_projection.hpp"
 #include "stretchmap/stretch/solid_newton.hpp"
 #include "stretchmap/stretch/tet_laplacian.hpp"
 #include "stretchmap/stretch/volumetric_stretch.hpp"
@@ -104,6 +105,22 @@ void bind_volume(py::module_& m) {
           },
           py::arg("x"), py::arg("weights"), py::arg("tol") = 1e-2, py::arg("max_cg") = 300,
           release_gil());
+
+  py::class_<RingStep>(m, "RingStep")
+      .def_readonly("x", &RingStep::x)
+      .def_readonly("error", &RingStep::error)
+      .def_readonly("cg_iterations", &RingStep::cg_iterations);
+  py::class_<RingProjection>(m, "RingProjection")
+      .def(py::init<const TetsRef&, const FlagsRef&>(), py::arg("tets").noconvert(),
+           py::arg("fixed").noconvert(), release_gil())
+      .def("error", &RingProjection::error, py::arg("x").noconvert(), py::arg("target"),
+           release_gil())
+      .def(
+          "step",
+          [](const RingProjection& self, const PointsRef& x, const VecRef& target, double tol,
+             int max_cg) { return self.step(x, target, tol, max_cg, signal_poll()); },
+          py::arg("x").noconvert(), py::arg("target"), py::arg("tol") = 1e-6,
+          py::arg("max_cg") = 2000, release_gil());
 
   m.def(
       "element_energy",

@@ -67,6 +67,8 @@ class VolumeMap(MapResult):
     stop_reason : str
     seconds : dict
         Wall-clock time per stage.
+    vertex_exact : bool
+        Whether the ring volumes of all interior vertices were made exact.
     """
 
     title = "volume"
@@ -84,6 +86,7 @@ class VolumeMap(MapResult):
     converged: bool
     stop_reason: str
     seconds: Mapping[str, float]
+    vertex_exact: bool = False
 
     def extra_scalars(self) -> dict[str, Any]:
         """Method, boundary and what was added to the input mesh."""
@@ -91,6 +94,7 @@ class VolumeMap(MapResult):
         return {
             "method": self.method,
             "boundary": self.boundary,
+            "vertex_exact": self.vertex_exact,
             "added_vertices": 0 if added is None else added.n_split,
             "added_tets": 0 if added is None else added.n_added_tets,
         }
@@ -113,6 +117,7 @@ def volume_map(
     boundary_map: AreaMap | None = None,
     start: ArrayLike | None = None,
     torus: Torus | None = None,
+    vertex_exact: bool = False,
     refine: bool = True,
     keep_best: bool = False,
     solver: str = "auto",
@@ -151,6 +156,10 @@ def volume_map(
         have to lie on it.
     torus : Torus, optional
         With ``start`` only.
+    vertex_exact : bool
+        Certified route only: in the end make the ring volume (6.5) of every interior vertex exact,
+        unless that turns a tet over or costs too much (`FlipFreeOptions.exact_sd_factor`); the
+        result says whether it was done.
     refine : bool
         Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
         can repair. False: refuse such a mesh.
@@ -183,6 +192,8 @@ def volume_map(
     if method is None:
         method = "certified" if c is None else "vsem"
     _check_options(method, boundary, c, max_iter, tol, start, torus, boundary_map)
+    if vertex_exact and method == "vsem":
+        raise OptionError("vertex_exact belongs to the certified route; leave c and method out")
     solid.require_solid_torus()
     seconds: dict[str, float] = {}
 
@@ -207,8 +218,8 @@ def volume_map(
         return _vsem_map(problem, c or 0.0, max_iter, tol, solver, boundary_map, seconds, progress)
     options = _with_overrides(options or FlipFreeOptions(), max_iter, tol)
     return _certified_map(
-        problem, boundary or "glide", options, solver, boundary_map, refinement, keep_best, seconds,
-        progress,
+        problem, boundary or "glide", vertex_exact, options, solver, boundary_map, refinement,
+        keep_best, seconds, progress,
     )  # fmt: skip
 
 
@@ -354,6 +365,7 @@ def _vsem_map(
 def _certified_map(
     problem: _Problem,
     boundary: str,
+    vertex_exact: bool,
     options: FlipFreeOptions,
     solver: str,
     boundary_map: AreaMap | None,
@@ -401,9 +413,16 @@ def _certified_map(
                 x, glide=True, start=first, goal=options.volume_weight
             )
             seconds["glide"] = time.perf_counter() - clock
+    exact = False
+    if flips == 0 and vertex_exact:
+        clock = time.perf_counter()
+        x, exact, reason = flip_free.make_rings_exact(x)
+        seconds["exact"] = time.perf_counter() - clock
+        if not exact:
+            _log.warning("ring volumes left as they were: %s", reason)
     result = _finish(
         problem, x, "certified", boundary, boundary_map, refinement,
-        history + tuple(flip_free.history), converged, stop_reason, seconds,
+        history + tuple(flip_free.history), converged, stop_reason, seconds, exact,
     )  # fmt: skip
     if not result.certificate.certified and not keep_best:
         ids = next(iter(result.certificate.ids.values()), ())
@@ -426,6 +445,7 @@ def _finish(
     converged: bool,
     stop_reason: str,
     seconds: dict[str, float],
+    vertex_exact: bool = False,
 ) -> VolumeMap:
     scale = problem.result_scale(x)
     image, torus = x * scale, problem.torus.scaled(scale)
@@ -451,4 +471,5 @@ def _finish(
         converged=converged,
         stop_reason=stop_reason,
         seconds=seconds,
+        vertex_exact=vertex_exact,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import igl
 import numpy as np
 import pytest
@@ -135,7 +137,7 @@ def test_vsem_step_solves_the_paper_system(bumpy, c):
 def test_vsem_energy_falls_at_every_step_and_flips_are_reported(bumpy):
     result = sm.volume_map(bumpy, c=0.0, max_iter=8, tol=0.0)
     energies = [record.energy for record in result.history]
-    assert all(b < a for a, b in zip(energies, energies[1:], strict=False))
+    assert all(b < a for a, b in pairwise(energies))
     volumes = _core.signed_tet_volumes(np.ascontiguousarray(result.image), bumpy.T)
     assert result.distortion.flips == np.count_nonzero(volumes <= 0.0)
     assert volumes.sum() == pytest.approx(bumpy.volume, rel=1e-12)
@@ -161,7 +163,7 @@ def test_certified_route_leaves_no_flip(bumpy, boundary):
     assert np.allclose(tube, r, rtol=1e-12)
     for stage in ("frozen", "glide"):
         energies = [record.energy for record in result.history if record.stage == stage]
-        assert all(b <= a for a, b in zip(energies, energies[1:], strict=False))
+        assert all(b <= a for a, b in pairwise(energies))
 
 
 def test_gliding_improves_on_frozen(bumpy):
@@ -198,6 +200,16 @@ def test_a_tangled_start_is_untangled(bumpy):
     again = sm.volume_map(bumpy, start=start, torus=good.torus, max_iter=2)
     assert again.certificate.certified
     assert any(record.stage == "untangle" for record in again.history)
+
+
+def test_ring_volumes_can_be_made_exact(bumpy):
+    plain = sm.volume_map(bumpy, max_iter=20)
+    exact = sm.volume_map(bumpy, max_iter=20, vertex_exact=True)
+    assert exact.vertex_exact and exact.certificate.certified
+    inner = np.setdiff1d(np.arange(bumpy.n_vertices), bumpy.boundary_vertices)
+    assert np.abs(exact.distortion.ring_ratios[inner] - 1.0).max() < 1e-9
+    assert exact.distortion.element_sd <= 1.25 * plain.distortion.element_sd
+    assert np.abs(plain.distortion.ring_ratios[inner] - 1.0).max() > 1e-6
 
 
 def test_refinement_is_reported_or_refused(load_solid):
