@@ -56,7 +56,8 @@ void bind_sem(py::module_& m) {
       .def_readonly("flips", &SurfaceFigures::flips)
       .def_readonly("ring_sd", &SurfaceFigures::ring_sd)
       .def_readonly("face_sd", &SurfaceFigures::face_sd)
-      .def_readonly("face_error", &SurfaceFigures::face_error);
+      .def_readonly("face_error", &SurfaceFigures::face_error)
+      .def_readonly("angle_mean", &SurfaceFigures::angle_mean);
   py::class_<SemStep>(m, "SemStep")
       .def_readonly("step", &SemStep::step)
       .def_readonly("residual", &SemStep::residual);

@@ -166,6 +166,13 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
   return energy;
 }
 
+Points glide_image(const GlideProblem& problem, const Points2Ref& angles) {
+  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  Points image(angles.rows(), 3);
+  for (Index i = 0; i < static_cast<Index>(image.rows()); ++i) image.row(i) = points[i].point;
+  return image;
+}
+
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles) {
   const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
   Vec areas(problem.chart.faces.rows());

@@ -6,7 +6,6 @@
 
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/stretch/line_roots.hpp"
-#include "stretchmap/stretch/surface_rings.hpp"
 
 namespace stretchmap {
 
@@ -15,7 +14,7 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586476925287;
 constexpr double kArmijo = 1e-4;
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
-constexpr int kRingSteps = 4;        // of each kind
+constexpr int kRingSteps = 3;        // of each kind
 constexpr int kHalvings = 30;
 constexpr double kRidge = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
@@ -101,15 +100,15 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
 }
 
 bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_goal) {
-  if (!ring_pattern_) ring_pattern_.emplace(problem_.chart.faces, problem_.chart.n_vertices, 3);
+  if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
   const SurfaceFigures before = figures();
   SurfaceFigures now = before;
   for (const RingStep kind : {RingStep::kBest, RingStep::kSmallest})
     for (int step = 0; step < kRingSteps && now.ring_sd > kRingGoal; ++step) {
       const Points2 last = angles_;
-      const Points2 direction = ring_step(*ring_pattern_, problem_, weights,
-                                          best_scale(problem_, angles_), angles_, kind);
+      const Points2 direction =
+          rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind);
       angles_ += std::min(1.0, longest_step(direction)) * direction;
       const SurfaceFigures next = figures();
       if (!(next.flips == 0 && next.ring_sd < 0.9 * now.ring_sd)) {
@@ -131,6 +130,9 @@ SurfaceFigures SurfaceNewton::figures() const {
   const Vec& source = problem_.reference.areas;
   figures.energy = (areas.array().square() / source.array()).sum();
   figures.flips = static_cast<Index>(flipped(problem_, angles_).size());
+  figures.angle_mean =
+      surface_quality(problem_.reference, problem_.chart.faces, glide_image(problem_, angles_))
+          .angle_mean;
   ratio_figures(problem_.chart.faces, problem_.chart.n_vertices, source, areas, figures);
   return figures;
 }

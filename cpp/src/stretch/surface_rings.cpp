@@ -1,6 +1,5 @@
 #include "stretchmap/stretch/surface_rings.hpp"
 
-#include <Eigen/SparseCholesky>
 #include <cmath>
 #include <vector>
 
@@ -75,16 +74,15 @@ Rows elements(const GlideProblem& problem, const Rings& rings, const Rows& hessi
 
 }  // namespace
 
-Points2 ring_step(const SurfacePattern& pattern, const GlideProblem& problem,
-                  const SurfaceWeights& weights, double scale, const Points2Ref& angles,
-                  RingStep kind) {
+Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
+                         const Points2Ref& angles, RingStep kind) {
   const Index n = problem.chart.n_vertices;
   const Rings rings = measure(problem, angles);
   const GlideEnergy energy =
       kind == RingStep::kBest ? glide_energy(problem, weights, scale, angles, Derivatives::kModel)
                               : squared_length(problem, angles);
-  SparseMatrix matrix = pattern.zeros();
-  pattern.scatter(elements(problem, rings, energy.hessians), matrix.valuePtr());
+  SparseMatrix matrix = pattern_.zeros();
+  pattern_.scatter(elements(problem, rings, energy.hessians), matrix.valuePtr());
   Vec diagonal = matrix.diagonal();
   const double size = diagonal.sum() / (2.0 * n);
   double coupling = 0.0;
@@ -97,13 +95,16 @@ Points2 ring_step(const SurfacePattern& pattern, const GlideProblem& problem,
     right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
     right(3 * i + 2) = 1.0 - rings.image(i) / (rings.total * rings.source(i));
   }
-  using Columns = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
-  const Columns columns = matrix;
-  const Eigen::SimplicialLDLT<Columns> factor(columns);
-  if (factor.info() != Eigen::Success)
+  // A symmetric matrix in compressed rows is itself in compressed columns.
+  const Eigen::Map<const Columns> columns(3 * n, 3 * n, matrix.nonZeros(), matrix.outerIndexPtr(),
+                                          matrix.innerIndexPtr(), matrix.valuePtr());
+  if (!analysed_) factor_.analyzePattern(columns);
+  analysed_ = true;
+  factor_.factorize(columns);
+  if (factor_.info() != Eigen::Success)
     throw Error("SolverError", "the equations for exact ring areas are singular");
-  Vec solution = factor.solve(right);
-  solution += factor.solve(right - matrix * solution);
+  Vec solution = factor_.solve(right);
+  solution += factor_.solve(right - matrix * solution);
   Points2 change(n, 2);
   for (Index i = 0; i < n; ++i) change.row(i) = solution.segment<2>(3 * i).transpose();
   return change;

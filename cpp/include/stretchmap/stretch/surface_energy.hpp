@@ -45,6 +45,9 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
 // The scale at which the area term is least: sqrt(sum |g| / sum (|t|^2 / |g|)).
 double best_scale(const GlideProblem& problem, const Points2Ref& angles);
 
+// (n, 3) points of the torus of area one.
+Points glide_image(const GlideProblem& problem, const Points2Ref& angles);
+
 // (m) areas of the polyhedral image; the torus itself has area one.
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles);
 

@@ -7,6 +7,7 @@
 #include "stretchmap/linalg/spd_solver.hpp"
 #include "stretchmap/stretch/surface_energy.hpp"
 #include "stretchmap/stretch/surface_pattern.hpp"
+#include "stretchmap/stretch/surface_rings.hpp"
 #include "stretchmap/stretch/surface_sem.hpp"
 
 namespace stretchmap {
@@ -32,7 +33,7 @@ class SurfaceNewton {
   // above both what it was and face_goal.
   bool project_rings(const SurfaceWeights& weights, double face_goal);
 
-  // Areas of rings and faces on the polyhedral image; `energy` is E_S / (its bound).
+  // Of the polyhedral image.
   SurfaceFigures figures() const;
   const Points2& angles() const { return angles_; }
   const GlideProblem& problem() const { return problem_; }
@@ -45,7 +46,7 @@ class SurfaceNewton {
   GlideProblem problem_;
   Points2 angles_;
   SurfacePattern pattern_;
-  std::optional<SurfacePattern> ring_pattern_;
+  std::optional<RingSystem> rings_;
   std::optional<SpdSolver> solver_;  // from the first step on
 };
 

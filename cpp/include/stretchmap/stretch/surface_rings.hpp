@@ -1,6 +1,8 @@
 // Ring areas made exact: n equations for 2n unknowns, so there is room to keep the faces good.
 #pragma once
 
+#include <Eigen/SparseCholesky>
+
 #include "stretchmap/stretch/surface_energy.hpp"
 #include "stretchmap/stretch/surface_pattern.hpp"
 
@@ -11,14 +13,26 @@ enum class RingStep {
   kSmallest  // shortest, lengths measured on the torus
 };
 
-// The change of the angles, (n, 2), that makes the area of every vertex ring (6.3) its share of the
-// total to first order and, among all that do, is best for the energy or shortest:
-//   [ H  J' ] [ dq ]   [ -g ]
-//   [ J  0  ] [ mu ] = [ -r ]
-// pattern: three unknowns per vertex (u, v and the multiplier of its ring).
-// \throws Error "SolverError" when the factorisation breaks down.
-Points2 ring_step(const SurfacePattern& pattern, const GlideProblem& problem,
-                  const SurfaceWeights& weights, double scale, const Points2Ref& angles,
-                  RingStep kind);
+// The equations of one step, three unknowns per vertex (u, v and the multiplier of its ring); the
+// symbolic analysis is kept.
+class RingSystem {
+ public:
+  RingSystem(const FacesRef& faces, Index n_vertices) : pattern_(faces, n_vertices, 3) {}
+
+  // The change of the angles, (n, 2), that makes the area of every vertex ring (6.3) its share of
+  // the total to first order and, among all that do, is best for the energy or shortest:
+  //   [ H  J' ] [ dq ]   [ -g ]
+  //   [ J  0  ] [ mu ] = [ -r ]
+  // \throws Error "SolverError" when the factorisation breaks down.
+  Points2 step(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
+               const Points2Ref& angles, RingStep kind);
+
+ private:
+  using Columns = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
+
+  SurfacePattern pattern_;
+  Eigen::SimplicialLDLT<Columns> factor_;
+  bool analysed_ = false;
+};
 
 }  // namespace stretchmap

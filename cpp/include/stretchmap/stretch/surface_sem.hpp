@@ -13,11 +13,12 @@
 namespace stretchmap {
 
 struct SurfaceFigures {
-  double energy = 0.0;      // of what is minimised
+  double energy = 0.0;      // E_S of shares of the area, at least 1
   Index flips = 0;          // faces with no or negative area in the chart
   double ring_sd = 0.0;     // standard deviation of the area ratios of vertex rings (6.3)
   double face_sd = 0.0;     // and of faces
   double face_error = 0.0;  // largest |ratio - 1| of a face
+  double angle_mean = 0.0;  // as in SurfaceQuality; 0 where it is not computed
 };
 
 struct SemStep {
