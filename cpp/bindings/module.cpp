@@ -10,6 +10,7 @@ void bind_linalg(py::module_& m);
 void bind_distortion(py::module_& m);
 void bind_area(py::module_& m);
 void bind_certificate(py::module_& m);
+void bind_apply(py::module_& m);
 }  // namespace stretchmap::bindings
 
 PYBIND11_MODULE(_core, m) {
@@ -34,4 +35,5 @@ PYBIND11_MODULE(_core, m) {
   bind_distortion(m);
   bind_area(m);
   bind_certificate(m);
+  bind_apply(m);
 }

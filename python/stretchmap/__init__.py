@@ -45,6 +45,10 @@ _EXPORTS = {
     "certify": "certificate",
     "certify_file": "certificate",
     "load_map": "results",
+    "PointMap": "coordinates",
+    "forward": "coordinates",
+    "inverse": "coordinates",
+    "torus_coordinates": "coordinates",
 }
 _MODULES = {"errors", "samples", "plot"}
 

@@ -1,0 +1,43 @@
+#include "arrays.hpp"
+#include "stretchmap/apply/chart_locator.hpp"
+#include "stretchmap/apply/split_tets.hpp"
+#include "stretchmap/apply/tet_locator.hpp"
+
+namespace stretchmap::bindings {
+
+void bind_apply(py::module_& m) {
+  py::class_<TetLocator>(m, "TetLocator")
+      .def(py::init<const PointsRef&, const TetsRef&, double>(), py::arg("points").noconvert(),
+           py::arg("tets").noconvert(), py::arg("tolerance"), release_gil())
+      .def(
+          "locate",
+          [](const TetLocator& self, const PointsRef& queries) {
+            TetLocation found = self.locate(queries, signal_poll());
+            return std::make_pair(std::move(found.tet), std::move(found.weights));
+          },
+          py::arg("queries").noconvert(), release_gil());
+
+  py::class_<ChartLocator>(m, "ChartLocator")
+      .def(py::init<SurfaceChart, const Points2Ref&>(), py::arg("chart"),
+           py::arg("turns").noconvert(), release_gil())
+      .def(
+          "locate",
+          [](const ChartLocator& self, const Points2Ref& queries) {
+            FaceLocation found = self.locate(queries);
+            return std::make_pair(std::move(found.face), std::move(found.weights));
+          },
+          py::arg("queries").noconvert(), release_gil());
+
+  py::class_<TetSplit>(m, "TetSplit")
+      .def_readonly("tets", &TetSplit::tets)
+      .def_readonly("side", &TetSplit::side)
+      .def_readonly("parent", &TetSplit::parent)
+      .def_readonly("cut_edges", &TetSplit::cut_edges)
+      .def_readonly("cut_weight", &TetSplit::cut_weight);
+  m.def("split_tets", &split_tets, py::arg("tets").noconvert(), py::arg("values").noconvert(),
+        py::arg("gate").noconvert(), release_gil());
+  m.def("volume_below", &volume_below, py::arg("tets").noconvert(), py::arg("volumes").noconvert(),
+        py::arg("values").noconvert(), release_gil());
+}
+
+}  // namespace stretchmap::bindings

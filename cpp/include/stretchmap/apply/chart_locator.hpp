@@ -1,0 +1,36 @@
+// Which face of a flat torus a point lies in: the same idea as TetLocator, periodic in both
+// coordinates.
+#pragma once
+
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+#include "stretchmap/stretch/chart.hpp"
+
+namespace stretchmap {
+
+struct FaceLocation {
+  IndexVec face;   // (n) face of each point, -1 if no face holds it
+  Points weights;  // (n, 3) barycentric coordinates, none below -1e-9
+};
+
+class ChartLocator {
+ public:
+  // turns (n, 2): chart coordinates of the vertices. \pre every face is smaller than half a turn.
+  // Faces without positive area are never answered.
+  ChartLocator(SurfaceChart chart, const Points2Ref& turns);
+
+  // queries (n, 2) in turns, any branch.
+  FaceLocation locate(const Points2Ref& queries) const;
+
+ private:
+  Index wrap(double coordinate) const;
+
+  SurfaceChart chart_;
+  Points2 turns_;
+  Index size_;                // cells per turn
+  std::vector<Index> start_;  // faces of cell c: face_[start_[c] .. start_[c + 1])
+  std::vector<Index> face_;
+};
+
+}  // namespace stretchmap
