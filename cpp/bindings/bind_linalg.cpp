@@ -22,11 +22,11 @@ void bind_spd(py::module_& m) {
            py::arg("matrix"), py::arg("backend") = "auto", release_gil())
       .def(
           "refactor",
-          [](SpdSolver& self, const VecRef& values) {
+          [](SpdSolver& self, const VecRef& values, bool keep_preconditioner) {
             set_values(self.matrix().valuePtr(), self.matrix().nonZeros(), values);
-            self.refactor();
+            self.refactor(keep_preconditioner);
           },
-          py::arg("values").noconvert(), release_gil())
+          py::arg("values").noconvert(), py::arg("keep_preconditioner") = false, release_gil())
       .def(
           "solve",
           [](SpdSolver& self, const RowsRef& B, Rows X, double tol, int max_iter,
@@ -53,11 +53,11 @@ void bind_block(py::module_& m) {
            py::arg("preconditioner") = "multigrid", release_gil())
       .def(
           "refactor",
-          [](BlockSolver& self, const VecRef& values) {
+          [](BlockSolver& self, const VecRef& values, bool keep_preconditioner) {
             set_values(self.matrix().values.data(), self.matrix().values.size(), values);
-            self.refactor();
+            self.refactor(keep_preconditioner);
           },
-          py::arg("values").noconvert(), release_gil())
+          py::arg("values").noconvert(), py::arg("keep_preconditioner") = false, release_gil())
       .def(
           "solve",
           [](BlockSolver& self, const PointsRef& b, Points x, double tol, int max_iter,

@@ -1,22 +1,14 @@
 #include "stretchmap/linalg/block_solver.hpp"
 
-#include <Eigen/Cholesky>
-#include <algorithm>
+#include <optional>
 #include <utility>
 
-#include "convergence_watch.hpp"
-#include "multigrid.hpp"
-#include "ordering.hpp"
-#include "parallel.hpp"
-#include "pcg.hpp"
-#include "spmv.hpp"
+#include "iterative.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap {
 
 using namespace linalg;
-using Block = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 Rows translations(Index n) {
   Rows modes = Rows::Zero(3 * static_cast<Eigen::Index>(n), 3);
   for (Index i = 0; i < n; ++i) modes.middleRows<3>(3 * static_cast<Eigen::Index>(i)).setIdentity();
@@ -38,44 +30,74 @@ Rows rigid_body_modes(const PointsRef& points) {
 
 struct BlockSolver::State {
   BlockMatrix A;
-  BlockOptions options;
-  std::vector<Block> inverse;  // jacobi: of the diagonal blocks
-  Rows modes;                  // multigrid: three or six columns, zero in rows that do not exist
-  std::vector<Index> order;    // multigrid: order[new] = old
-  bool hierarchy = false;
-  ConvergenceWatch watch;
-  Multigrid<3, 3> translations_only;
-  Multigrid<3, 6> rigid;
-
-  bool multigrid() const { return options.preconditioner == "multigrid"; }
-  void invert_diagonal();
-  void mask_modes();
-  template <class Hierarchy>
-  void factor(Hierarchy& multigrid);
-  PcgResult<1> solve(const double* b, double* x, const SolveOptions& solve_options,
-                     const Poll& poll);
+  std::optional<IterativeSolver<3, 3>> small;  // three modes, or the diagonal alone
+  std::optional<IterativeSolver<3, 6>> large;  // six modes
 };
+
+namespace {
+
+void require_pattern(const BlockMatrix& A) {
+  const Index n = A.rows();
+  if (n < 0 || A.row_ptr[0] != 0 || A.row_ptr[n] != A.col.size() ||
+      A.values.size() != 9 * A.col.size())
+    throw Error("SolverError", "the arrays of the block matrix do not belong together");
+  std::vector<Index> bad;
+  for (Index i = 0; i < n && bad.size() < 20; ++i) {
+    const Index begin = A.row_ptr[i], end = A.row_ptr[i + 1];
+    bool good = begin <= end && end <= A.col.size(), diagonal = false;
+    for (Index e = begin; good && e < end; ++e) {
+      good = A.col[e] >= 0 && A.col[e] < n && (e == begin || A.col[e - 1] < A.col[e]);
+      diagonal = diagonal || A.col[e] == i;
+    }
+    if (!good || !diagonal) bad.push_back(i);
+  }
+  if (!bad.empty())
+    throw Error("SolverError",
+                "block row " + std::to_string(bad[0]) +
+                    " has no diagonal block, or columns out of range or order",
+                bad);
+}
+
+// The modes, zero for an unknown without any coupling: it takes no part in them.
+std::vector<double> masked_modes(const BlockMatrix& A, const RowsRef& near_nullspace) {
+  Rows modes = near_nullspace;
+  for (Index i = 0; i < A.rows(); ++i) {
+    bool coupled[3] = {false, false, false};
+    for (Index e = A.row_ptr[i]; e < A.row_ptr[i + 1]; ++e)
+      for (int k = 0; k < 9; ++k)
+        if ((A.col[e] != i || k % 4 != 0) && A.values[9 * static_cast<Eigen::Index>(e) + k] != 0.0)
+          coupled[k / 3] = true;
+    for (int r = 0; r < 3; ++r)
+      if (!coupled[r]) modes.row(3 * static_cast<Eigen::Index>(i) + r).setZero();
+  }
+  return {modes.data(), modes.data() + modes.size()};
+}
+
+}  // namespace
 
 BlockSolver::BlockSolver(BlockMatrix A, const RowsRef& near_nullspace, const BlockOptions& options)
     : state_(std::make_unique<State>()) {
   if (options.preconditioner != "multigrid" && options.preconditioner != "jacobi")
     throw Error("OptionError", "unknown preconditioner '" + options.preconditioner +
                                    "': choose multigrid or jacobi");
+  require_pattern(A);
   if (near_nullspace.rows() != 3 * static_cast<Eigen::Index>(A.rows()) ||
       (near_nullspace.cols() != 3 && near_nullspace.cols() != 6))
     throw Error("SolverError",
                 "the near-nullspace must have three rows per vertex, 3 or 6 columns");
-  state_->A = std::move(A);
-  state_->options = options;
-  if (state_->multigrid()) {
-    state_->modes = near_nullspace;
-    state_->mask_modes();
-  }
+  State& s = *state_;
+  s.A = std::move(A);
+  std::vector<double> modes;
+  if (options.preconditioner == "multigrid") modes = masked_modes(s.A, near_nullspace);
+  if (near_nullspace.cols() == 3 || modes.empty())
+    s.small.emplace(s.A.rows(), s.A.row_ptr.data(), s.A.col.data(), std::move(modes));
+  else
+    s.large.emplace(s.A.rows(), s.A.row_ptr.data(), s.A.col.data(), std::move(modes));
   refactor();
 }
 
 BlockSolver::BlockSolver(BlockMatrix A, const BlockOptions& options)
-    : BlockSolver(std::move(A), translations(A.rows()), options) {}
+    : BlockSolver(A, translations(A.rows()), options) {}
 
 BlockSolver::~BlockSolver() = default;
 BlockSolver::BlockSolver(BlockSolver&&) noexcept = default;
@@ -84,127 +106,27 @@ BlockSolver& BlockSolver::operator=(BlockSolver&&) noexcept = default;
 BlockMatrix& BlockSolver::matrix() { return state_->A; }
 const BlockMatrix& BlockSolver::matrix() const { return state_->A; }
 
-// An unknown without any coupling takes no part in the modes.
-void BlockSolver::State::mask_modes() {
-  for (Index i = 0; i < A.rows(); ++i) {
-    bool coupled[3] = {false, false, false};
-    for (Index e = A.row_ptr[i]; e < A.row_ptr[i + 1]; ++e)
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c)
-          coupled[r] =
-              coupled[r] || ((A.col[e] != i || r != c) &&
-                             A.values[9 * static_cast<Eigen::Index>(e) + 3 * r + c] != 0.0);
-    for (int r = 0; r < 3; ++r)
-      if (!coupled[r]) modes.row(3 * static_cast<Eigen::Index>(i) + r).setZero();
-  }
-}
-
-// The inverse diagonal blocks, which must be positive definite.
-void BlockSolver::State::invert_diagonal() {
-  const Index n = A.rows();
-  inverse.resize(static_cast<std::size_t>(n));
-  std::vector<char> good(static_cast<std::size_t>(n), 0);
-  for_chunks(n, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) {
-      const Index* first = A.col.data() + A.row_ptr[i];
-      const Index* last = A.col.data() + A.row_ptr[i + 1];
-      const Index* found = std::lower_bound(first, last, i);
-      if (found == last || *found != i) continue;
-      const Eigen::Map<const Block> block(A.values.data() + 9 * (found - A.col.data()));
-      const Eigen::LLT<Eigen::Matrix3d> llt(block);
-      good[i] = block.allFinite() && llt.info() == Eigen::Success;
-      inverse[i] = llt.solve(Eigen::Matrix3d::Identity());
-    }
-  });
-  std::vector<Index> bad;
-  for (Index i = 0; i < n && bad.size() < 20; ++i)
-    if (!good[i]) bad.push_back(i);
-  if (!bad.empty())
-    throw Error("SolverError",
-                "the diagonal block of vertex " + std::to_string(bad[0]) +
-                    " is missing or not positive definite",
-                bad);
-}
-
-template <class Hierarchy>
-void BlockSolver::State::factor(Hierarchy& multigrid) {
-  if (!hierarchy) {
-    order = breadth_first_order(A.rows(), A.row_ptr.data(), A.col.data());
-    multigrid.finest().set_pattern(A.rows(), A.row_ptr.data(), A.col.data(), order);
-  }
-  multigrid.finest().set_values(A.values.data());
-  if (hierarchy && !watch.worn()) {
-    multigrid.refresh();
-    return;
-  }
-  const Eigen::Index width = 3 * modes.cols();
-  std::vector<double> ordered(static_cast<std::size_t>(modes.size()));
-  for (std::size_t i = 0; i < order.size(); ++i)
-    std::copy_n(modes.data() + width * order[i], width, ordered.data() + width * i);
-  multigrid.setup(ordered);
-  hierarchy = true;
-  watch.reset();
-}
-
-void BlockSolver::refactor() {
+void BlockSolver::refactor(bool keep_preconditioner) {
   State& s = *state_;
-  s.invert_diagonal();
-  if (!s.multigrid()) return;
-  if (s.modes.cols() == 3)
-    s.factor(s.translations_only);
-  else
-    s.factor(s.rigid);
-}
-
-// Everything here is in the numbering of `order`.
-PcgResult<1> BlockSolver::State::solve(const double* b, double* x,
-                                       const SolveOptions& solve_options, const Poll& poll) {
-  const Index n = A.rows();
-  PcgSystem system;
-  system.n = 3 * n;
-  const auto use = [&](auto& multigrid) {
-    system.apply = [&](const double* in, double* out) {
-      multigrid.finest().template multiply<1>(in, out);
-    };
-    system.precondition = [&](const double* in, double* out) {
-      multigrid.template precondition<1>(in, out);
-    };
-  };
-  if (!multigrid()) {
-    system.apply = [&](const double* in, double* out) { multiply(A, in, out); };
-    system.precondition = [&](const double* in, double* out) {
-      for_chunks(n, [&](Index begin, Index end) {
-        for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
-          Eigen::Map<Eigen::Vector3d>(out + 3 * i) =
-              inverse[i] * Eigen::Map<const Eigen::Vector3d>(in + 3 * i);
-      });
-    };
-  } else if (modes.cols() == 3) {
-    use(translations_only);
-  } else {
-    use(rigid);
-  }
-  const PcgResult<1> result = pcg<1>(system, b, x, solve_options, poll);
-  watch.observe(result.iterations, result.digits);
-  return result;
+  const double* values = s.A.values.data();
+  const std::vector<Index> bad = s.small ? s.small->refactor(values, keep_preconditioner)
+                                         : s.large->refactor(values, keep_preconditioner);
+  if (!bad.empty())
+    throw Error(
+        "SolverError",
+        "the diagonal block of vertex " + std::to_string(bad[0]) + " is not positive definite",
+        bad);
 }
 
 SolveReport BlockSolver::solve(const PointsRef& b, Eigen::Ref<Points> x,
                                const SolveOptions& options, const Poll& poll) {
   State& s = *state_;
-  const Index n = s.A.rows();
-  if (b.rows() != n || x.rows() != n)
+  if (b.rows() != s.A.rows() || x.rows() != b.rows())
     throw Error("SolverError", "right-hand side and solution must have a row per vertex");
-  const auto old_row = [&](Index i) { return s.order.empty() ? i : s.order[i]; };
-  Points ordered_b(n, 3), ordered_x(n, 3);
-  for (Index i = 0; i < n; ++i) {
-    ordered_b.row(i) = b.row(old_row(i));
-    ordered_x.row(i) = x.row(old_row(i));
-  }
-  const PcgResult<1> result = s.solve(ordered_b.data(), ordered_x.data(), options, poll);
+  const PcgResult<1> result = s.small ? s.small->solve<1>(b.data(), x.data(), 1, 1, options, poll)
+                                      : s.large->solve<1>(b.data(), x.data(), 1, 1, options, poll);
   if (!result.finite)
     throw Error("SolverError", "a value that is not finite appeared while solving");
-  for (Index i = 0; i < n; ++i) x.row(old_row(i)) = ordered_x.row(i);
   SolveReport report;
   report.iterations = result.iterations;
   report.residual = Vec::Constant(1, result.residual[0]);

@@ -25,7 +25,7 @@ void Cholesky::refactor(const SparseMatrix& A) {
 }
 
 template <int K>
-void Cholesky::solve(const double* B, double* X) {
+void Cholesky::substitute(const double* B, double* X) {
   // The factor in compressed columns, diagonal first in each; P A P' = L L'.
   const ColumnMatrix& L = factor_.matrixL().nestedExpression();
   const Index n = static_cast<Index>(L.cols());
@@ -55,8 +55,39 @@ void Cholesky::solve(const double* B, double* X) {
     for (int k = 0; k < K; ++k) X[K * i + k] = w[static_cast<std::size_t>(K) * permute[i] + k];
 }
 
-template void Cholesky::solve<1>(const double*, double*);
-template void Cholesky::solve<2>(const double*, double*);
-template void Cholesky::solve<4>(const double*, double*);
+template <int K>
+PcgResult<K> Cholesky::solve(const SparseMatrix& A, const double* B, double* X,
+                             const SolveOptions& options) {
+  using Columns =
+      Eigen::Matrix<double, Eigen::Dynamic, K, K == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
+  const Eigen::Map<const Columns> b(B, A.rows(), K);
+  Eigen::Map<Columns> x(X, A.rows(), K);
+  PcgResult<K> result;
+  substitute<K>(B, X);
+  Columns residual = b - A * x, correction(A.rows(), K);
+  const auto size = b.colwise().norm().eval();
+  auto error = residual.colwise().norm().eval();
+  while (result.iterations < std::min(3, options.max_iter) &&
+         (error.array() > options.tol * size.array()).any()) {
+    substitute<K>(residual.data(), correction.data());
+    const Columns refined = x + correction;
+    residual = b - A * refined;
+    const auto refined_error = residual.colwise().norm().eval();
+    if (!(refined_error.sum() < error.sum())) break;
+    x = refined;
+    error = refined_error;
+    ++result.iterations;
+  }
+  for (int k = 0; k < K; ++k) result.residual[k] = size[k] > 0.0 ? error[k] / size[k] : 0.0;
+  result.finite = x.allFinite() && error.allFinite();
+  return result;
+}
+
+template PcgResult<1> Cholesky::solve(const SparseMatrix&, const double*, double*,
+                                      const SolveOptions&);
+template PcgResult<2> Cholesky::solve(const SparseMatrix&, const double*, double*,
+                                      const SolveOptions&);
+template PcgResult<4> Cholesky::solve(const SparseMatrix&, const double*, double*,
+                                      const SolveOptions&);
 
 }  // namespace stretchmap::linalg

@@ -3,20 +3,25 @@
 
 #include <Eigen/SparseCholesky>
 
-#include "stretchmap/base/types.hpp"
+#include "pcg.hpp"
 
 namespace stretchmap::linalg {
 
 class Cholesky {
  public:
-  // \throws SolverError if A is not positive definite or not finite.
+  // \throws SolverError if A is not positive definite.
   explicit Cholesky(const SparseMatrix& A);
   void refactor(const SparseMatrix& A);
-  // X = A^-1 B for K interleaved columns (K = 1, 2, 4); B and X may be the same array.
+
+  // X = A^-1 B, B and X (n, K) row-major, followed by at most three steps of refinement towards
+  // the goal; the result's iterations count these.
   template <int K>
-  void solve(const double* B, double* X);
+  PcgResult<K> solve(const SparseMatrix& A, const double* B, double* X,
+                     const SolveOptions& options);
 
  private:
+  template <int K>
+  void substitute(const double* B, double* X);
   using ColumnMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
   Eigen::SimplicialLLT<ColumnMatrix, Eigen::Lower, Eigen::AMDOrdering<Index>> factor_;
   std::vector<double> work_;

@@ -104,44 +104,51 @@ void LevelMatrix<B>::set_pattern(Index rows, const Index* row_start, const Index
 }
 
 template <int B>
-Index LevelMatrix<B>::set_values(const double* values) {
+void LevelMatrix<B>::set_product_values(const double* values, double scale) {
   constexpr size_t kSize = B * B;
   value.resize(kSize * col.size());
-  value_f.resize(kSize * col.size() + kPadding);
   diagonal.resize(kSize * n);
+  const auto copy = [&](Index from, double* to) {
+    for (size_t k = 0; k < kSize; ++k) to[k] = scale * values[kSize * from + k];
+  };
   for_chunks(n, [&](Index begin, Index end) {
-    for (size_t e = start[begin]; e < static_cast<size_t>(start[end]); ++e) {
-      const double* from = values + kSize * source[e];
-      for (int r = 0; r < B; ++r)
-        for (int c = 0; c < B; ++c) {
-          value[kSize * e + B * r + c] = from[B * r + c];
-          value_f[kSize * e + B * c + r] = static_cast<float>(from[B * r + c]);
-        }
-    }
+    for (size_t e = start[begin]; e < static_cast<size_t>(start[end]); ++e)
+      copy(source[e], value.data() + kSize * e);
     for (size_t i = begin; i < static_cast<size_t>(end); ++i)
-      std::copy_n(values + kSize * diagonal_source[i], kSize, diagonal.data() + kSize * i);
+      copy(diagonal_source[i], diagonal.data() + kSize * i);
   });
-  std::vector<char> bad(n, 0);
-  set_diagonals(bad);
-  set_excess();
-  const auto first = std::find(bad.begin(), bad.end(), 1);
-  return first == bad.end() ? -1 : static_cast<Index>(first - bad.begin());
 }
 
 template <int B>
-void LevelMatrix<B>::set_diagonals(std::vector<char>& bad) {
+std::vector<Index> LevelMatrix<B>::set_values(const double* values, double scale) {
+  constexpr size_t kSize = B * B;
+  set_product_values(values, scale);
+  value_f.resize(kSize * col.size() + kPadding);
+  for_chunks(n, [&](Index begin, Index end) {
+    for (size_t e = start[begin]; e < static_cast<size_t>(start[end]); ++e)
+      for (int r = 0; r < B; ++r)
+        for (int c = 0; c < B; ++c)
+          value_f[kSize * e + B * c + r] = static_cast<float>(value[kSize * e + B * r + c]);
+  });
+  std::vector<Index> bad = set_diagonals();
+  set_excess();
+  return bad;
+}
+
+template <int B>
+std::vector<Index> LevelMatrix<B>::set_diagonals() {
   constexpr size_t kSize = B * B;
   inverse_f.resize(kSize * n + kPadding);
+  std::vector<char> bad(n, 0);
   for_chunks(n, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
       Eigen::Map<RowBlock<double, B>> block(diagonal.data() + kSize * i);
       const Eigen::LLT<ColBlock<double, B>> llt(block);
-      if (llt.info() != Eigen::Success) {
-        // Only the smoother sees this: the absolute values of the eigenvalues, none too small.
-        bad[i] = 1;
+      bad[i] = llt.info() != Eigen::Success || !block.allFinite();
+      if (bad[i]) {
         const Eigen::SelfAdjointEigenSolver<ColBlock<double, B>> eigen(block);
         const auto size = eigen.eigenvalues().cwiseAbs().eval();
-        const double floor = std::max(1e-6 * size.maxCoeff(), 1e-300);
+        const double floor = std::max(1e-6 * size.maxCoeff(), 1e-30);
         block = eigen.eigenvectors() * size.cwiseMax(floor).asDiagonal() *
                 eigen.eigenvectors().transpose();
       }
@@ -149,6 +156,10 @@ void LevelMatrix<B>::set_diagonals(std::vector<char>& bad) {
           block.inverse().template cast<float>();
     }
   });
+  std::vector<Index> rows;
+  for (Index i = 0; i < n && rows.size() < 20; ++i)
+    if (bad[i]) rows.push_back(i);
+  return rows;
 }
 
 template <int B>
@@ -174,19 +185,38 @@ void LevelMatrix<B>::set_excess() {
 
 template <int B>
 template <int K>
-void LevelMatrix<B>::multiply(const double* x, double* y) const {
-  for_chunks(n, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) {
-      double sum[B * K] = {};
+std::array<double, K> LevelMatrix<B>::multiply(const double* x, double* y) const {
+  constexpr size_t kBlock = B * B, kRow = B * K;
+  return sum_chunks<K>(n, [&](Index begin, Index end, std::array<double, K>& dots) {
+    for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
+      double sum[kRow] = {};
       const auto add = [&](const double* block, const double* xe) {
         for (int r = 0; r < B; ++r)
           for (int c = 0; c < B; ++c)
             for (int k = 0; k < K; ++k) sum[K * r + k] += block[B * r + c] * xe[K * c + k];
       };
-      add(diagonal.data() + static_cast<size_t>(B * B) * i, x + static_cast<size_t>(B * K) * i);
-      for (Index e = start[i]; e < start[i + 1]; ++e)
-        add(value.data() + static_cast<size_t>(B * B) * e, x + static_cast<size_t>(B * K) * col[e]);
-      for (int k = 0; k < B * K; ++k) y[static_cast<size_t>(B * K) * i + k] = sum[k];
+      add(diagonal.data() + kBlock * i, x + kRow * i);
+      for (size_t e = start[i]; e < static_cast<size_t>(start[i + 1]); ++e)
+        add(value.data() + kBlock * e, x + kRow * col[e]);
+      for (int r = 0; r < B; ++r)
+        for (int k = 0; k < K; ++k) {
+          y[kRow * i + K * r + k] = sum[K * r + k];
+          dots[k] += x[kRow * i + K * r + k] * sum[K * r + k];
+        }
+    }
+  });
+}
+
+template <int B>
+template <int K>
+void LevelMatrix<B>::divide_by_diagonal(const float* r, float* z) const {
+  constexpr size_t kBlock = B * B, kRow = B * K;
+  for_chunks(n, [&](Index begin, Index end) {
+    for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
+      RowSum<B, K> row;
+      row.load(r + kRow * i);
+      row.transform(inverse_f.data() + kBlock * i);
+      row.store(z + kRow * i);
     }
   });
 }
@@ -268,21 +298,26 @@ void LevelMatrix<B>::scaled_multiply(const float* x, float* y) const {
 }
 
 template struct LevelMatrix<1>;
-template void LevelMatrix<1>::multiply<1>(const double*, double*) const;
-template void LevelMatrix<1>::multiply<2>(const double*, double*) const;
-template void LevelMatrix<1>::multiply<4>(const double*, double*) const;
+template std::array<double, 1> LevelMatrix<1>::multiply<1>(const double*, double*) const;
+template void LevelMatrix<1>::divide_by_diagonal<1>(const float*, float*) const;
 template void LevelMatrix<1>::sweep_forward<1>(const float*, float*, float*) const;
-template void LevelMatrix<1>::sweep_forward<2>(const float*, float*, float*) const;
-template void LevelMatrix<1>::sweep_forward<4>(const float*, float*, float*) const;
 template void LevelMatrix<1>::sweep_backward<1>(const float*, const float*, float*) const;
+template std::array<double, 2> LevelMatrix<1>::multiply<2>(const double*, double*) const;
+template void LevelMatrix<1>::divide_by_diagonal<2>(const float*, float*) const;
+template void LevelMatrix<1>::sweep_forward<2>(const float*, float*, float*) const;
 template void LevelMatrix<1>::sweep_backward<2>(const float*, const float*, float*) const;
+template std::array<double, 4> LevelMatrix<1>::multiply<4>(const double*, double*) const;
+template void LevelMatrix<1>::divide_by_diagonal<4>(const float*, float*) const;
+template void LevelMatrix<1>::sweep_forward<4>(const float*, float*, float*) const;
 template void LevelMatrix<1>::sweep_backward<4>(const float*, const float*, float*) const;
 template struct LevelMatrix<3>;
-template void LevelMatrix<3>::multiply<1>(const double*, double*) const;
+template std::array<double, 1> LevelMatrix<3>::multiply<1>(const double*, double*) const;
+template void LevelMatrix<3>::divide_by_diagonal<1>(const float*, float*) const;
 template void LevelMatrix<3>::sweep_forward<1>(const float*, float*, float*) const;
 template void LevelMatrix<3>::sweep_backward<1>(const float*, const float*, float*) const;
 template struct LevelMatrix<6>;
-template void LevelMatrix<6>::multiply<1>(const double*, double*) const;
+template std::array<double, 1> LevelMatrix<6>::multiply<1>(const double*, double*) const;
+template void LevelMatrix<6>::divide_by_diagonal<1>(const float*, float*) const;
 template void LevelMatrix<6>::sweep_forward<1>(const float*, float*, float*) const;
 template void LevelMatrix<6>::sweep_backward<1>(const float*, const float*, float*) const;
 

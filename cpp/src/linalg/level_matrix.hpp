@@ -31,13 +31,19 @@ struct LevelMatrix {
   // and columns; empty: as it is.
   void set_pattern(Index rows, const Index* row_start, const Index* columns,
                    const std::vector<Index>& order);
-  // Values of the pattern's entries in its own order, row-major blocks. Returns the first row whose
-  // diagonal block is not positive definite (it is replaced by a positive one), -1 if none.
-  Index set_values(const double* values);
+  // Values of the pattern's entries in its own order, row-major blocks, times `scale`. Returns the
+  // rows (at most 20) whose diagonal block is not positive definite; such a block is replaced by
+  // one with the absolute values of its eigenvalues.
+  std::vector<Index> set_values(const double* values, double scale = 1.0);
+  // The same for the products only: smoothing goes on with the values it has.
+  void set_product_values(const double* values, double scale);
 
-  // y = A x, K columns.
+  // y = A x, K columns; returns x'y of each column.
   template <int K>
-  void multiply(const double* x, double* y) const;
+  std::array<double, K> multiply(const double* x, double* y) const;
+  // z = D^-1 r, K columns.
+  template <int K>
+  void divide_by_diagonal(const float* r, float* z) const;
   // x = M b with M one forward sweep from zero; r = b - A x.
   template <int K>
   void sweep_forward(const float* b, float* x, float* r) const;
@@ -48,7 +54,7 @@ struct LevelMatrix {
   void scaled_multiply(const float* x, float* y) const;
 
  private:
-  void set_diagonals(std::vector<char>& bad);
+  std::vector<Index> set_diagonals();
   void set_excess();
 };
 

@@ -97,21 +97,21 @@ void Level<B, K>::set_transfer(bool fresh) {
 
 template <int B, int K>
 template <int N>
-void Level<B, K>::descend(std::vector<float>& coarse_b) {
+void Level<B, K>::descend(const float* right_hand_side, std::vector<float>& coarse_b) {
   const size_t size = static_cast<size_t>(B) * N * A.n;
-  x.resize(size);
-  y.resize(size);
-  r.resize(size);
+  smooth.resize(size);
+  work.resize(size);
   coarse_b.resize(static_cast<size_t>(K) * N * transfer.aggregates.count);
-  A.template sweep_forward<N>(b.data(), x.data(), r.data());
-  transfer.template restrict_to<N>(r.data(), coarse_b.data());
+  A.template sweep_forward<N>(right_hand_side, smooth.data(), work.data());
+  transfer.template restrict_to<N>(work.data(), coarse_b.data());
 }
 
 template <int B, int K>
 template <int N>
-void Level<B, K>::ascend(const std::vector<float>& coarse_x) {
-  transfer.template prolong_add<N>(coarse_x.data(), x.data(), y.data());
-  A.template sweep_backward<N>(b.data(), y.data(), x.data());
+void Level<B, K>::ascend(const float* right_hand_side, const std::vector<float>& coarse_x,
+                         float* out) {
+  transfer.template prolong_add<N>(coarse_x.data(), smooth.data(), work.data());
+  A.template sweep_backward<N>(right_hand_side, work.data(), out);
 }
 
 template <int B, int K>
@@ -151,27 +151,21 @@ void Multigrid<B, K>::refresh() {
 
 template <int B, int K>
 template <int N>
-void Multigrid<B, K>::precondition(const double* r, double* z) {
-  const Index n = finest_.A.n * B * N;
-  finest_.b.resize(n);
-  for_chunks(n, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) finest_.b[i] = static_cast<float>(r[i]);
-  });
+void Multigrid<B, K>::precondition(const float* r, float* z) {
   const auto right_hand_side = [&](size_t level) -> std::vector<float>& {
     return level < coarse_.size() ? coarse_[level].b : last_b_;
   };
-  finest_.template descend<N>(right_hand_side(0));
+  finest_.template descend<N>(r, right_hand_side(0));
   for (size_t level = 0; level < coarse_.size(); ++level)
-    coarse_[level].template descend<N>(right_hand_side(level + 1));
+    coarse_[level].template descend<N>(coarse_[level].b.data(), right_hand_side(level + 1));
   last_x_.resize(last_b_.size());
   last_.apply<N>(last_b_.data(), last_x_.data());
   const std::vector<float>* below = &last_x_;
-  for (size_t level = coarse_.size(); level-- > 0; below = &coarse_[level].x)
-    coarse_[level].template ascend<N>(*below);
-  finest_.template ascend<N>(*below);
-  for_chunks(n, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) z[i] = finest_.x[i];
-  });
+  for (size_t level = coarse_.size(); level-- > 0; below = &coarse_[level].x) {
+    coarse_[level].x.resize(coarse_[level].b.size());
+    coarse_[level].template ascend<N>(coarse_[level].b.data(), *below, coarse_[level].x.data());
+  }
+  finest_.template ascend<N>(r, *below, z);
 }
 
 template <int B, int K>
@@ -192,12 +186,12 @@ double Multigrid<B, K>::operator_complexity() const {
 }
 
 template class Multigrid<1, 1>;
-template void Multigrid<1, 1>::precondition<1>(const double*, double*);
-template void Multigrid<1, 1>::precondition<2>(const double*, double*);
-template void Multigrid<1, 1>::precondition<4>(const double*, double*);
+template void Multigrid<1, 1>::precondition<1>(const float*, float*);
+template void Multigrid<1, 1>::precondition<2>(const float*, float*);
+template void Multigrid<1, 1>::precondition<4>(const float*, float*);
 template class Multigrid<3, 3>;
-template void Multigrid<3, 3>::precondition<1>(const double*, double*);
+template void Multigrid<3, 3>::precondition<1>(const float*, float*);
 template class Multigrid<3, 6>;
-template void Multigrid<3, 6>::precondition<1>(const double*, double*);
+template void Multigrid<3, 6>::precondition<1>(const float*, float*);
 
 }  // namespace stretchmap::linalg

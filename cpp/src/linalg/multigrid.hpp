@@ -26,14 +26,16 @@ template <int B, int K>
 struct Level {
   LevelMatrix<B> A;
   Transfer<B, K> transfer;
-  std::vector<float> b, x, y, r, probe;  // b: right-hand side, x: solution of this level
+  std::vector<float> b, x;          // right-hand side and correction, used below the finest level
+  std::vector<float> smooth, work;  // after the first sweep; residual, then corrected
+  std::vector<float> probe;         // approximate eigenvector of D^-1 A
 
   // Renews the transfer's numbers; `fresh`: the damping is estimated from scratch.
   void set_transfer(bool fresh);
   template <int N>
-  void descend(std::vector<float>& coarse_b);
+  void descend(const float* right_hand_side, std::vector<float>& coarse_b);
   template <int N>
-  void ascend(const std::vector<float>& coarse_x);
+  void ascend(const float* right_hand_side, const std::vector<float>& coarse_x, float* out);
 };
 
 // B unknowns per row on the finest level, K (near-nullspace modes) on the others.
@@ -51,7 +53,7 @@ class Multigrid {
 
   // z = M r for N interleaved columns; M symmetric positive definite up to rounding.
   template <int N>
-  void precondition(const double* r, double* z);
+  void precondition(const float* r, float* z);
 
   std::vector<Index> level_sizes() const;  // block rows, finest first, coarsest last
   double operator_complexity() const;      // numbers stored on all levels over the finest's

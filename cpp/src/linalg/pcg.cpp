@@ -12,22 +12,23 @@ namespace {
 template <int K>
 using Scalars = std::array<double, K>;
 
-template <int K>
-Scalars<K> dots(Index n, const double* a, const double* b) {
+template <int K, class Real>
+Scalars<K> dots(Index n, const double* a, const Real* b) {
   return sum_chunks<K>(n, [&](Index begin, Index end, Scalars<K>& sums) {
     for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
       for (int k = 0; k < K; ++k) sums[k] += a[K * i + k] * b[K * i + k];
   });
 }
 
-// r = b - q, returns |r|^2.
+// r = b - q, in both precisions; returns |r|^2.
 template <int K>
-Scalars<K> residual_from(Index n, const double* b, const double* q, double* r) {
+Scalars<K> residual_from(Index n, const double* b, const double* q, double* r, float* r_f) {
   return sum_chunks<K>(n, [&](Index begin, Index end, Scalars<K>& sums) {
     for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
       for (int k = 0; k < K; ++k) {
         const double value = b[K * i + k] - q[K * i + k];
         r[K * i + k] = value;
+        r_f[K * i + k] = static_cast<float>(value);
         sums[k] += value * value;
       }
   });
@@ -36,13 +37,14 @@ Scalars<K> residual_from(Index n, const double* b, const double* q, double* r) {
 // x += alpha p, r -= alpha q, returns |r|^2.
 template <int K>
 Scalars<K> advance(Index n, const Scalars<K>& alpha, const double* p, const double* q, double* x,
-                   double* r) {
+                   double* r, float* r_f) {
   return sum_chunks<K>(n, [&](Index begin, Index end, Scalars<K>& sums) {
     for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
       for (int k = 0; k < K; ++k) {
         x[K * i + k] += alpha[k] * p[K * i + k];
         const double value = r[K * i + k] - alpha[k] * q[K * i + k];
         r[K * i + k] = value;
+        r_f[K * i + k] = static_cast<float>(value);
         sums[k] += value * value;
       }
   });
@@ -50,7 +52,7 @@ Scalars<K> advance(Index n, const Scalars<K>& alpha, const double* p, const doub
 
 // p = z + beta p
 template <int K>
-void turn(Index n, const Scalars<K>& beta, const double* z, double* p) {
+void turn(Index n, const Scalars<K>& beta, const float* z, double* p) {
   for_chunks(n, [&](Index begin, Index end) {
     for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
       for (int k = 0; k < K; ++k) p[K * i + k] = z[K * i + k] + beta[k] * p[K * i + k];
@@ -67,13 +69,14 @@ bool all_finite(const Scalars<K>& values) {
 // What one run of conjugate gradients needs to go on.
 template <int K>
 struct Run {
-  const PcgSystem& system;
+  const PcgSystem<K>& system;
   const double* b;
   double* x;
-  Scalars<K> goal;  // squared residual aimed at
-  std::vector<double> r, z, p, q;
+  Scalars<K> goal{};  // squared residual aimed at
+  std::vector<double> r{}, p{}, q{};
+  std::vector<float> r_f{}, z{};
   Scalars<K> rr{};
-  PcgResult<K> result;
+  PcgResult<K> result{};
 
   bool reached() const {
     for (int k = 0; k < K; ++k)
@@ -83,7 +86,7 @@ struct Run {
 
   void true_residual() {
     system.apply(x, q.data());
-    rr = residual_from<K>(system.n, b, q.data(), r.data());
+    rr = residual_from<K>(system.n, b, q.data(), r.data(), r_f.data());
     result.finite = result.finite && all_finite<K>(rr);
   }
 
@@ -93,14 +96,13 @@ struct Run {
     const Index n = system.n;
     for (bool first = true; result.iterations < max_iter && !reached(); first = false) {
       if (poll) poll();
-      system.precondition(r.data(), z.data());
+      system.precondition(r_f.data(), z.data());
       const Scalars<K> rz = dots<K>(n, r.data(), z.data());
       if (!(result.finite = all_finite<K>(rz))) return;
       Scalars<K> beta{};
       for (int k = 0; k < K; ++k) beta[k] = first || rz_old[k] == 0.0 ? 0.0 : rz[k] / rz_old[k];
       turn<K>(n, beta, z.data(), p.data());
-      system.apply(p.data(), q.data());
-      const Scalars<K> pq = dots<K>(n, p.data(), q.data());
+      const Scalars<K> pq = system.apply(p.data(), q.data());
       if (!(result.finite = all_finite<K>(pq))) return;
       Scalars<K> alpha{};
       for (int k = 0; k < K; ++k) {
@@ -110,12 +112,12 @@ struct Run {
           alpha = {};
           // At the very first step there is no iterate to keep: the preconditioned gradient.
           if (result.iterations == 0 && rz[k] > 0.0) alpha[k] = 1.0;
-          advance<K>(n, alpha, p.data(), q.data(), x, r.data());
+          advance<K>(n, alpha, p.data(), q.data(), x, r.data(), r_f.data());
           return;
         }
         alpha[k] = rz[k] / pq[k];
       }
-      rr = advance<K>(n, alpha, p.data(), q.data(), x, r.data());
+      rr = advance<K>(n, alpha, p.data(), q.data(), x, r.data(), r_f.data());
       if (!(result.finite = all_finite<K>(rr))) return;
       rz_old = rz;
       ++result.iterations;
@@ -126,21 +128,14 @@ struct Run {
 }  // namespace
 
 template <int K>
-PcgResult<K> pcg(const PcgSystem& system, const double* b, double* x, const SolveOptions& options,
-                 const Poll& poll) {
+PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x,
+                 const SolveOptions& options, const Poll& poll) {
   const Index n = system.n;
   const std::size_t size = static_cast<std::size_t>(n) * K;
   const Scalars<K> bb = dots<K>(n, b, b);
-  Run<K> run{system,
-             b,
-             x,
-             {},
-             std::vector<double>(size),
-             std::vector<double>(size),
-             std::vector<double>(size),
-             std::vector<double>(size),
-             {},
-             {}};
+  Run<K> run{system, b, x};
+  for (std::vector<double>* vector : {&run.r, &run.p, &run.q}) vector->resize(size);
+  for (std::vector<float>* vector : {&run.r_f, &run.z}) vector->resize(size);
   if (!(run.result.finite = all_finite<K>(bb))) return run.result;
   for (int k = 0; k < K; ++k) {
     run.goal[k] = options.tol * options.tol * bb[k];
@@ -166,11 +161,11 @@ PcgResult<K> pcg(const PcgSystem& system, const double* b, double* x, const Solv
   return run.result;
 }
 
-template PcgResult<1> pcg<1>(const PcgSystem&, const double*, double*, const SolveOptions&,
+template PcgResult<1> pcg<1>(const PcgSystem<1>&, const double*, double*, const SolveOptions&,
                              const Poll&);
-template PcgResult<2> pcg<2>(const PcgSystem&, const double*, double*, const SolveOptions&,
+template PcgResult<2> pcg<2>(const PcgSystem<2>&, const double*, double*, const SolveOptions&,
                              const Poll&);
-template PcgResult<4> pcg<4>(const PcgSystem&, const double*, double*, const SolveOptions&,
+template PcgResult<4> pcg<4>(const PcgSystem<4>&, const double*, double*, const SolveOptions&,
                              const Poll&);
 
 }  // namespace stretchmap::linalg

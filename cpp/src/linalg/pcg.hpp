@@ -9,13 +9,13 @@
 
 namespace stretchmap::linalg {
 
-// Columns solved together; three right-hand sides travel as four, the last one zero.
-inline int padded_columns(Index k) { return k >= 3 ? 4 : static_cast<int>(k); }
-
+template <int K>
 struct PcgSystem {
-  Index n = 0;                                               // rows
-  std::function<void(const double*, double*)> apply;         // y = A x, K columns
-  std::function<void(const double*, double*)> precondition;  // z = M r, K columns, M SPD
+  Index n = 0;  // rows
+  // y = A x; returns x'y of each column.
+  std::function<std::array<double, K>(const double*, double*)> apply;
+  // z = M r with M symmetric positive definite. Single precision: b should be of moderate size.
+  std::function<void(const float*, float*)> precondition;
 };
 
 template <int K>
@@ -29,14 +29,14 @@ struct PcgResult {
 
 // x: warm start in, solution out. A column with b = 0 gives x = 0 and residual 0.
 template <int K>
-PcgResult<K> pcg(const PcgSystem& system, const double* b, double* x, const SolveOptions& options,
-                 const Poll& poll);
+PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x,
+                 const SolveOptions& options, const Poll& poll);
 
-extern template PcgResult<1> pcg<1>(const PcgSystem&, const double*, double*, const SolveOptions&,
-                                    const Poll&);
-extern template PcgResult<2> pcg<2>(const PcgSystem&, const double*, double*, const SolveOptions&,
-                                    const Poll&);
-extern template PcgResult<4> pcg<4>(const PcgSystem&, const double*, double*, const SolveOptions&,
-                                    const Poll&);
+extern template PcgResult<1> pcg<1>(const PcgSystem<1>&, const double*, double*,
+                                    const SolveOptions&, const Poll&);
+extern template PcgResult<2> pcg<2>(const PcgSystem<2>&, const double*, double*,
+                                    const SolveOptions&, const Poll&);
+extern template PcgResult<4> pcg<4>(const PcgSystem<4>&, const double*, double*,
+                                    const SolveOptions&, const Poll&);
 
 }  // namespace stretchmap::linalg

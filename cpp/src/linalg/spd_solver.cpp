@@ -5,12 +5,7 @@
 #include <utility>
 
 #include "cholesky.hpp"
-#include "convergence_watch.hpp"
-#include "multigrid.hpp"
-#include "ordering.hpp"
-#include "parallel.hpp"
-#include "pcg.hpp"
-#include "spmv.hpp"
+#include "iterative.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap {
@@ -27,18 +22,19 @@ std::string choose_backend(const SparseMatrix& A) {
   return A.rows() <= (surface ? 30000 : 4000) ? "direct" : "multigrid";
 }
 
-// The inverse diagonal; its rows must be positive for any backend.
-Vec inverse_diagonal(const SparseMatrix& A) {
+[[noreturn]] void refuse_rows(std::vector<Index> rows) {
+  throw Error("SolverError",
+              "the matrix is not positive definite: row " + std::to_string(rows[0]) +
+                  " has a diagonal entry that is not a positive number",
+              rows);
+}
+
+void require_positive_diagonal(const SparseMatrix& A) {
   const Vec diagonal = A.diagonal();
   std::vector<Index> bad;
   for (Index i = 0; i < A.rows(); ++i)
     if (!(diagonal[i] > 0.0 && std::isfinite(diagonal[i])) && bad.size() < 20) bad.push_back(i);
-  if (!bad.empty())
-    throw Error("SolverError",
-                "the matrix is not positive definite: row " + std::to_string(bad[0]) +
-                    " has a diagonal entry that is not a positive number",
-                bad);
-  return diagonal.cwiseInverse();
+  if (!bad.empty()) refuse_rows(bad);
 }
 
 // x'(A y) = y'(A x) for two fixed vectors of scattered signs.
@@ -46,7 +42,7 @@ void require_symmetric(const SparseMatrix& A) {
   if (A.rows() != A.cols() || !A.isCompressed())
     throw Error("SolverError", "the matrix must be square and compressed");
   const Index n = static_cast<Index>(A.rows());
-  Vec x(n), y(n), Ax(n), Ay(n);
+  Vec x(n), y(n);
   std::uint32_t state = 12345;
   for (Index i = 0; i < n; ++i) {
     state = state * 1664525u + 1013904223u;
@@ -54,8 +50,7 @@ void require_symmetric(const SparseMatrix& A) {
     state = state * 1664525u + 1013904223u;
     y[i] = static_cast<double>(state >> 8) / (1u << 24) - 0.5;
   }
-  multiply<1>(A, x.data(), Ax.data());
-  multiply<1>(A, y.data(), Ay.data());
+  const Vec Ax = A * x, Ay = A * y;
   const double left = y.dot(Ax), right = x.dot(Ay);
   const double scale = y.cwiseAbs().dot(Ax.cwiseAbs()) + x.cwiseAbs().dot(Ay.cwiseAbs());
   if (!std::isfinite(left + right + scale))
@@ -70,20 +65,11 @@ struct SpdSolver::State {
   SparseMatrix A;
   std::string backend;
   std::optional<Cholesky> cholesky;
-  Vec inverse;               // jacobi
-  std::vector<Index> order;  // multigrid: order[new] = old
-  Multigrid<1, 1> multigrid;
-  bool hierarchy = false;
-  ConvergenceWatch watch;
+  std::optional<IterativeSolver<1, 1>> iterative;
 
-  void factor_multigrid();
   template <int K>
-  PcgResult<K> direct(const double* b, double* x, const SolveOptions& options);
-  template <int K>
-  PcgResult<K> iterative(const double* b, double* x, const SolveOptions& options, const Poll& poll);
-  template <int K>
-  void columns(const RowsRef& B, Eigen::Ref<Rows>& X, Index first, const SolveOptions& options,
-               const Poll& poll, SolveReport& report);
+  PcgResult<K> columns(const RowsRef& B, Eigen::Ref<Rows>& X, Index first,
+                       const SolveOptions& options, const Poll& poll);
 };
 
 SpdSolver::SpdSolver(SparseMatrix A, const SpdOptions& options)
@@ -95,6 +81,7 @@ SpdSolver::SpdSolver(SparseMatrix A, const SpdOptions& options)
   if (backend != "direct" && backend != "multigrid" && backend != "jacobi")
     throw Error("OptionError",
                 "unknown solver '" + backend + "': choose auto, direct, multigrid or jacobi");
+  require_positive_diagonal(state_->A);
   refactor();
 }
 
@@ -106,90 +93,42 @@ SparseMatrix& SpdSolver::matrix() { return state_->A; }
 const SparseMatrix& SpdSolver::matrix() const { return state_->A; }
 const std::string& SpdSolver::backend() const { return state_->backend; }
 
-void SpdSolver::refactor() {
+void SpdSolver::refactor(bool keep_preconditioner) {
   State& s = *state_;
-  s.inverse = inverse_diagonal(s.A);
-  if (s.backend == "multigrid") s.factor_multigrid();
-  if (s.backend != "direct") return;
-  if (s.cholesky)
-    s.cholesky->refactor(s.A);
-  else
-    s.cholesky.emplace(s.A);
-}
-
-void SpdSolver::State::factor_multigrid() {
-  const Index n = static_cast<Index>(A.rows());
-  if (!hierarchy) {
-    order = breadth_first_order(n, A.outerIndexPtr(), A.innerIndexPtr());
-    multigrid.finest().set_pattern(n, A.outerIndexPtr(), A.innerIndexPtr(), order);
-  }
-  multigrid.finest().set_values(A.valuePtr());
-  if (hierarchy && !watch.worn()) {
-    multigrid.refresh();
+  if (s.backend == "direct") {
+    require_positive_diagonal(s.A);
+    if (s.cholesky)
+      s.cholesky->refactor(s.A);
+    else
+      s.cholesky.emplace(s.A);
     return;
   }
-  multigrid.setup(std::vector<double>(order.size(), 1.0));
-  hierarchy = true;
-  watch.reset();
+  const Index n = static_cast<Index>(s.A.rows());
+  const std::size_t modes = s.backend == "multigrid" ? static_cast<std::size_t>(n) : 0;
+  if (!s.iterative)
+    s.iterative.emplace(n, s.A.outerIndexPtr(), s.A.innerIndexPtr(),
+                        std::vector<double>(modes, 1.0));
+  const std::vector<Index> bad = s.iterative->refactor(s.A.valuePtr(), keep_preconditioner);
+  if (!bad.empty()) refuse_rows(bad);
 }
 
+// Solves for the columns from `first` on, at most K of them.
 template <int K>
-PcgResult<K> SpdSolver::State::direct(const double* b, double* x, const SolveOptions& options) {
-  // Refinement: the exact solve is the preconditioner, one step is nearly always enough.
-  const PcgSystem system{static_cast<Index>(A.rows()),
-                         [&](const double* in, double* out) { multiply<K>(A, in, out); },
-                         [&](const double* in, double* out) { cholesky->solve<K>(in, out); }};
-  cholesky->solve<K>(b, x);
-  SolveOptions refine = options;
-  refine.max_iter = std::min(options.max_iter, 3);
-  return pcg<K>(system, b, x, refine, {});
-}
-
-template <int K>
-PcgResult<K> SpdSolver::State::iterative(const double* b, double* x, const SolveOptions& options,
-                                         const Poll& poll) {
-  const Index n = static_cast<Index>(A.rows());
-  const auto jacobi = [&](const double* in, double* out) {
-    for_chunks(n, [&](Index begin, Index end) {
-      for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
-        for (int k = 0; k < K; ++k) out[K * i + k] = inverse[i] * in[K * i + k];
-    });
-  };
-  if (backend == "jacobi") {
-    const PcgSystem system{n, [&](const double* in, double* out) { multiply<K>(A, in, out); },
-                           jacobi};
-    return pcg<K>(system, b, x, options, poll);
+PcgResult<K> SpdSolver::State::columns(const RowsRef& B, Eigen::Ref<Rows>& X, Index first,
+                                       const SolveOptions& options, const Poll& poll) {
+  const int used = static_cast<int>(std::min<Eigen::Index>(K, B.cols() - first));
+  if (iterative) {
+    const Index stride = static_cast<Index>(B.cols());
+    return iterative->template solve<K>(B.data() + first, X.data() + first, stride, used, options,
+                                        poll);
   }
-  const PcgSystem system{
-      n, [&](const double* in, double* out) { multigrid.finest().multiply<K>(in, out); },
-      [&](const double* in, double* out) { multigrid.precondition<K>(in, out); }};
-  const PcgResult<K> result = pcg<K>(system, b, x, options, poll);
-  watch.observe(result.iterations, result.digits);
-  return result;
-}
-
-// Solves for K columns from `first` on, those beyond the last one being zero.
-template <int K>
-void SpdSolver::State::columns(const RowsRef& B, Eigen::Ref<Rows>& X, Index first,
-                               const SolveOptions& options, const Poll& poll, SolveReport& report) {
   using Columns =
       Eigen::Matrix<double, Eigen::Dynamic, K, K == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
-  const Index used = std::min<Index>(K, static_cast<Index>(B.cols()) - first);
-  Columns b = Columns::Zero(B.rows(), K), x = Columns::Zero(B.rows(), K);
-  const auto old_row = [&](Index i) { return order.empty() ? i : order[i]; };
-  for (Index i = 0; i < B.rows(); ++i) {
-    b.row(i).head(used) = B.row(old_row(i)).segment(first, used);
-    x.row(i).head(used) = X.row(old_row(i)).segment(first, used);
-  }
-  const PcgResult<K> result = backend == "direct" ? direct<K>(b.data(), x.data(), options)
-                                                  : iterative<K>(b.data(), x.data(), options, poll);
-  if (!result.finite)
-    throw Error("SolverError", "a value that is not finite appeared while solving");
-  if (result.negative_curvature)
-    throw Error("SolverError", "the matrix is not positive definite (negative curvature)");
-  for (Index i = 0; i < B.rows(); ++i) X.row(old_row(i)).segment(first, used) = x.row(i).head(used);
-  report.iterations = std::max(report.iterations, result.iterations);
-  for (Index k = 0; k < used; ++k) report.residual[first + k] = result.residual[k];
+  Columns b = Columns::Zero(B.rows(), K), x(B.rows(), K);
+  b.leftCols(used) = B.middleCols(first, used);
+  const PcgResult<K> result = cholesky->template solve<K>(A, b.data(), x.data(), options);
+  X.middleCols(first, used) = x.leftCols(used);
+  return result;
 }
 
 SolveReport SpdSolver::solve(const RowsRef& B, Eigen::Ref<Rows> X, const SolveOptions& options,
@@ -199,15 +138,27 @@ SolveReport SpdSolver::solve(const RowsRef& B, Eigen::Ref<Rows> X, const SolveOp
     throw Error("SolverError", "right-hand side and solution must have a row per unknown");
   SolveReport report;
   report.residual = Vec::Zero(B.cols());
-  for (Index first = 0; first < B.cols();) {
-    const Index left = static_cast<Index>(B.cols()) - first;
-    if (left >= 3)
-      s.columns<4>(B, X, first, options, poll, report);
-    else if (left == 2)
-      s.columns<2>(B, X, first, options, poll, report);
-    else
-      s.columns<1>(B, X, first, options, poll, report);
-    first += std::min<Index>(left, 4);
+  Index first = 0;
+  const auto take = [&](const auto& result) {
+    if (!result.finite)
+      throw Error("SolverError", "a value that is not finite appeared while solving");
+    if (result.negative_curvature)
+      throw Error("SolverError", "the matrix is not positive definite (negative curvature)");
+    report.iterations = std::max(report.iterations, result.iterations);
+    for (std::size_t k = 0; k < result.residual.size() && first < B.cols(); ++k)
+      report.residual[first++] = result.residual[k];
+  };
+  while (first < B.cols()) {
+    switch (padded_columns(static_cast<Index>(B.cols()) - first)) {
+      case 4:
+        take(s.columns<4>(B, X, first, options, poll));
+        break;
+      case 2:
+        take(s.columns<2>(B, X, first, options, poll));
+        break;
+      default:
+        take(s.columns<1>(B, X, first, options, poll));
+    }
   }
   report.converged = (report.residual.array() <= options.tol).all();
   if (!report.converged && options.must_converge)

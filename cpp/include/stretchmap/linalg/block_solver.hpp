@@ -51,8 +51,10 @@ class BlockSolver {
   BlockMatrix& matrix();
   const BlockMatrix& matrix() const;
 
-  // After matrix().values changed (same pattern): renews numbers on the old hierarchy.
-  void refactor();
+  // After matrix().values changed (same pattern): renews numbers on the old hierarchy, which is
+  // built again when convergence is seen to suffer. keep_preconditioner: solve with the new values,
+  // precondition with the old ones.
+  void refactor(bool keep_preconditioner = false);
 
   // Solves A x = b for b (n, 3), from x (n, 3). Should a direction of negative curvature turn up,
   // the last iterate before it is kept, and at the first step x plus the preconditioned residual:

@@ -42,8 +42,10 @@ class SpdSolver {
 
   // After the values of matrix() changed. The multigrid keeps its aggregates and patterns and only
   // renews numbers, until convergence is seen to suffer; then it starts again by itself.
+  // keep_preconditioner: solve with the new values, precondition with the old ones; for a small
+  // change (a direct solver and the diagonal are always renewed).
   // \throws SolverError as the constructor.
-  void refactor();
+  void refactor(bool keep_preconditioner = false);
 
   // Solves A X = B for B (n, k), any k, starting from X (n, k). A zero right-hand side gives zero.
   // \throws SolverError if the matrix shows itself not positive definite, a value is not finite,

@@ -1,0 +1,111 @@
+#include "iterative.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "ordering.hpp"
+
+namespace stretchmap::linalg {
+
+using std::size_t;
+
+template <int B, int M>
+IterativeSolver<B, M>::IterativeSolver(Index n, const Index* start, const Index* col,
+                                       std::vector<double> modes)
+    : order_(breadth_first_order(n, start, col)) {
+  multigrid_.finest().set_pattern(n, start, col, order_);
+  constexpr size_t kWidth = static_cast<size_t>(B) * M;
+  modes_.resize(modes.size());
+  for (size_t i = 0; kWidth * i < modes.size(); ++i)
+    std::copy_n(modes.data() + kWidth * order_[i], kWidth, modes_.data() + kWidth * i);
+}
+
+template <int B, int M>
+void IterativeSolver<B, M>::set_scale(const double* values) {
+  double largest = 0.0;
+  for (Index entry : multigrid_.finest().diagonal_source)
+    for (int r = 0; r < B; ++r)
+      largest = std::max(largest, values[static_cast<size_t>(B * B) * entry + (B + 1) * r]);
+  scale_ = largest > 0.0 && std::isfinite(largest) ? std::ldexp(1.0, -std::ilogb(largest)) : 1.0;
+}
+
+template <int B, int M>
+std::vector<Index> IterativeSolver<B, M>::refactor(const double* values, bool keep) {
+  LevelMatrix<B>& A = multigrid_.finest();
+  if (keep && ready_) {
+    A.set_product_values(values, scale_);
+    return {};
+  }
+  set_scale(values);
+  std::vector<Index> bad = A.set_values(values, scale_);
+  for (Index& row : bad) row = order_[row];
+  if (!bad.empty() || modes_.empty()) return bad;
+  if (ready_ && !watch_.worn()) {
+    multigrid_.refresh();
+  } else {
+    multigrid_.setup(modes_);
+    watch_.reset();
+    ready_ = true;
+  }
+  return bad;
+}
+
+template <int B, int M>
+template <int K>
+PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stride, int used,
+                                          const SolveOptions& options, const Poll& poll) {
+  const LevelMatrix<B>& A = multigrid_.finest();
+  const size_t n = A.n;
+  // Columns scaled to moderate size, by powers of two so that nothing is rounded.
+  std::array<double, K> factor;
+  factor.fill(1.0);
+  for (int k = 0; k < used; ++k) {
+    double largest = 0.0;
+    for (size_t row = 0; row < n * B; ++row)
+      largest = std::max(largest, std::abs(b[static_cast<size_t>(stride) * row + k]));
+    if (largest > 0.0 && std::isfinite(largest)) factor[k] = std::ldexp(1.0, -std::ilogb(largest));
+  }
+  std::vector<double> inner_b(n * B * K, 0.0), inner_x(n * B * K, 0.0);
+  const auto each = [&](const auto& visit) {
+    for_chunks(A.n, [&](Index begin, Index end) {
+      for (size_t i = begin; i < static_cast<size_t>(end); ++i)
+        for (size_t r = 0; r < B; ++r)
+          for (int k = 0; k < used; ++k)
+            visit(K * (B * i + r) + k, stride * (B * static_cast<size_t>(order_[i]) + r) + k,
+                  factor[k]);
+    });
+  };
+  each([&](size_t in, size_t out, double f) {
+    inner_b[in] = f * b[out];
+    inner_x[in] = f / scale_ * x[out];
+  });
+  const PcgSystem<K> system{
+      A.n * B, [&](const double* p, double* q) { return A.template multiply<K>(p, q); },
+      [&](const float* r, float* z) {
+        if (modes_.empty())
+          A.template divide_by_diagonal<K>(r, z);
+        else
+          multigrid_.template precondition<K>(r, z);
+      }};
+  const PcgResult<K> result = pcg<K>(system, inner_b.data(), inner_x.data(), options, poll);
+  if (result.finite)
+    each([&](size_t in, size_t out, double f) { x[out] = scale_ / f * inner_x[in]; });
+  watch_.observe(result.iterations, result.digits);
+  return result;
+}
+
+template class IterativeSolver<1, 1>;
+template PcgResult<1> IterativeSolver<1, 1>::solve<1>(const double*, double*, Index, int,
+                                                      const SolveOptions&, const Poll&);
+template PcgResult<2> IterativeSolver<1, 1>::solve<2>(const double*, double*, Index, int,
+                                                      const SolveOptions&, const Poll&);
+template PcgResult<4> IterativeSolver<1, 1>::solve<4>(const double*, double*, Index, int,
+                                                      const SolveOptions&, const Poll&);
+template class IterativeSolver<3, 3>;
+template PcgResult<1> IterativeSolver<3, 3>::solve<1>(const double*, double*, Index, int,
+                                                      const SolveOptions&, const Poll&);
+template class IterativeSolver<3, 6>;
+template PcgResult<1> IterativeSolver<3, 6>::solve<1>(const double*, double*, Index, int,
+                                                      const SolveOptions&, const Poll&);
+
+}  // namespace stretchmap::linalg

@@ -1,0 +1,43 @@
+// Conjugate gradients on a renumbered and rescaled copy of the caller's matrix, preconditioned by
+// its diagonal blocks or by multigrid.
+#pragma once
+
+#include <vector>
+
+#include "convergence_watch.hpp"
+#include "multigrid.hpp"
+#include "pcg.hpp"
+
+namespace stretchmap::linalg {
+
+// Columns solved together; three right-hand sides travel as four, the last one zero.
+inline int padded_columns(Index k) { return k >= 3 ? 4 : static_cast<int>(k); }
+
+// B unknowns per block row, M near-nullspace modes.
+template <int B, int M>
+class IterativeSolver {
+ public:
+  // Pattern in compressed rows, with the diagonal. modes (n B M), row-major; empty: the diagonal
+  // blocks alone precondition.
+  IterativeSolver(Index n, const Index* start, const Index* col, std::vector<double> modes);
+
+  // Values in the pattern's order, row-major blocks. keep: the preconditioner stays as it is.
+  // Returns rows whose diagonal block is not positive definite; with any the solver is unusable.
+  std::vector<Index> refactor(const double* values, bool keep);
+
+  // Row r of column k is b[stride r + k], k < used <= K; the columns from `used` on are zero.
+  template <int K>
+  PcgResult<K> solve(const double* b, double* x, Index stride, int used,
+                     const SolveOptions& options, const Poll& poll);
+
+ private:
+  void set_scale(const double* values);
+  std::vector<Index> order_;  // order_[new] = old, block rows
+  std::vector<double> modes_;
+  Multigrid<B, M> multigrid_;  // with the diagonal alone only its finest level is used
+  ConvergenceWatch watch_;
+  bool ready_ = false;
+  double scale_ = 1.0;  // power of two that brings the diagonal near one
+};
+
+}  // namespace stretchmap::linalg
