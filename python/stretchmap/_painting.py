@@ -1,0 +1,155 @@
+"""Drawing of surfaces by matplotlib alone: orthographic projection, light, painter's algorithm.
+
+The pictures need no graphics hardware and no further package, so they come out the same everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+# Light from the upper left, in front; directions in the picture's (right, up, towards the viewer).
+_LIGHT = np.array([-0.45, 0.55, 0.7]) / math.sqrt(0.45**2 + 0.55**2 + 0.7**2)
+
+# Height of every picture over its width, so that those side by side agree.
+_HEIGHT = 0.85
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the viewer stands.
+
+    Attributes
+    ----------
+    elevation, azimuth : float
+        Degrees above the xy-plane and around the z-axis.
+    """
+
+    elevation: float = 35.0
+    azimuth: float = -60.0
+
+    @property
+    def axes(self) -> Array:
+        """(3, 3): rows are the directions right, up and towards the viewer."""
+        e, a = math.radians(self.elevation), math.radians(self.azimuth)
+        towards = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+        right = np.array([-math.sin(a), math.cos(a), 0.0])
+        return np.stack([right, np.cross(towards, right), towards])
+
+
+@dataclass
+class Scene:
+    """Triangles and lines that hide each other; collected first, drawn at once."""
+
+    view: View
+    _polygons: list[Array] = field(default_factory=list)
+    _colours: list[Array] = field(default_factory=list)
+    _depths: list[Array] = field(default_factory=list)
+    _outlines: list[tuple[Array, Any]] = field(default_factory=list)
+
+    def add_faces(self, corners: Array, colours: Array) -> None:
+        """Add triangles; those that look away from the viewer are left out.
+
+        Parameters
+        ----------
+        corners : (m, 3, 3) ndarray
+            Corners of each face, counter-clockwise from outside.
+        colours : (m, 3) ndarray
+            Colour of each face in full light, red, green, blue from 0 to 1.
+        """
+        x = corners @ self.view.axes.T
+        normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+        seen = normals[:, 2] > 0.0
+        bright = 0.45 + 0.55 * np.clip(normals[seen] @ _LIGHT, 0.0, 1.0)
+        self._polygons.append(x[seen, :, :2])
+        self._colours.append(np.clip(colours[seen] * bright[:, None], 0.0, 1.0))
+        self._depths.append(x[seen, :, 2].mean(axis=1))
+
+    def add_loop(self, points: Array, colour: Any, width: float, lift: float) -> None:
+        """Add a closed polygon: a ribbon, only dotted where faces lie before it.
+
+        Parameters
+        ----------
+        points : (k, 3) ndarray
+        colour : colour of matplotlib
+        width : float
+            In the units of the points.
+        lift : float
+            How far it is drawn towards the viewer, so that its own surface does not hide it.
+        """
+        from matplotlib.colors import to_rgb
+
+        start = points @ self.view.axes.T
+        self._outlines.append((np.concatenate([start, start[:1]])[:, :2], colour))
+        end = np.roll(start, -1, axis=0)
+        along = end[:, :2] - start[:, :2]
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        along = along / np.where(length > 0.0, length, 1.0)
+        side = 0.5 * width * np.stack([-along[:, 1], along[:, 0]], axis=1)
+        a, b = start[:, :2] - 0.3 * width * along, end[:, :2] + 0.3 * width * along
+        depth = 0.5 * (start[:, 2] + end[:, 2]) + lift
+        for triangle in ((a - side, b - side, b + side), (a - side, b + side, a + side)):
+            self._polygons.append(np.stack(triangle, axis=1))
+            self._colours.append(np.tile(to_rgb(colour), (len(points), 1)))
+            self._depths.append(depth)
+
+    def draw(self, axes: Axes) -> None:
+        """Paint everything, the farthest first, and fit the axes to it."""
+        from matplotlib.collections import PolyCollection
+
+        polygons, colours = np.concatenate(self._polygons), np.concatenate(self._colours)
+        order = np.argsort(np.concatenate(self._depths), kind="stable")
+        axes.add_collection(
+            PolyCollection(
+                polygons[order],
+                facecolors=colours[order],
+                edgecolors=colours[order],
+                linewidths=0.4,
+                rasterized=True,
+            )
+        )
+        for line, colour in self._outlines:
+            axes.plot(*line.T, ":", color=colour, linewidth=1.2)
+        low, high = polygons.min(axis=(0, 1)), polygons.max(axis=(0, 1))
+        width, height = high - low
+        width = 1.06 * max(width, height / _HEIGHT)
+        x, y = 0.5 * (low + high)
+        axes.set_xlim(x - 0.5 * width, x + 0.5 * width)
+        axes.set_ylim(y - 0.5 * _HEIGHT * width, y + 0.5 * _HEIGHT * width)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+
+
+def subdivided(corners: Array, pieces: int) -> Array:
+    """Cut every triangle into ``pieces**2``; values at the corners are interpolated linearly.
+
+    Parameters
+    ----------
+    corners : (m, 3, d) ndarray
+    pieces : int
+        Pieces of each side.
+
+    Returns
+    -------
+    (m * pieces**2, 3, d) ndarray
+        The pieces of a triangle follow each other.
+    """
+    k = pieces
+    up = [((i, j), (i + 1, j), (i, j + 1)) for i in range(k) for j in range(k - i)]
+    down = [
+        ((i + 1, j), (i + 1, j + 1), (i, j + 1)) for i in range(k - 1) for j in range(k - 1 - i)
+    ]
+    nodes = np.array(up + down, float) / k  # (k^2, 3, 2)
+    weights = np.concatenate([1.0 - nodes.sum(axis=2, keepdims=True), nodes], axis=2)
+    return np.einsum("pqc,mcd->mpqd", weights, corners).reshape(-1, 3, corners.shape[2])
