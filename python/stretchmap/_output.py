@@ -46,10 +46,11 @@ def plain(value: Any) -> Any:
 def table(rows: Mapping[str, Any]) -> str:
     """Two aligned columns, one row per entry."""
     width = max((len(name) for name in rows), default=0)
-    return "\n".join(f"{name.replace('_', ' '):<{width}}  {_cell(v)}" for name, v in rows.items())
+    return "\n".join(f"{name.replace('_', ' '):<{width}}  {cell(v)}" for name, v in rows.items())
 
 
-def _cell(value: Any) -> str:
+def cell(value: Any) -> str:
+    """A value as tables show it."""
     if value is None:
         return "-"
     if isinstance(value, bool):

@@ -278,7 +278,9 @@ class LoadedMap(MapResult):
         """Measured anew from the mesh and the image."""
         from .measures import distortion
 
-        return distortion(self.mesh, self.image, torus=self.torus, angles=self.arrays.get("angles"))
+        angles = self.arrays.get("angles")
+        torus = self.torus if angles is None else None
+        return distortion(self.mesh, self.image, torus=torus, angles=angles)
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """The arrays the file held beyond the common ones."""

@@ -74,7 +74,9 @@ def conformal(
     watch = common.Stopwatch()
     surface = common.surface_of(common.read_mesh(input, orient, compact))
     watch.lap("read")
-    finish(conformal_map(surface), output, json, quiet, watch)
+    result = conformal_map(surface)
+    watch.lap("compute")
+    finish(result, output, json, quiet, watch)
 
 
 def area(
@@ -99,6 +101,7 @@ def area(
     watch.lap("read")
     with terminal(quiet) as bar:
         result = area_map(surface, **options, progress=bar)
+    watch.lap("compute")
     finish(result, output, json, quiet, watch)
 
 
@@ -159,6 +162,7 @@ def volume(
             solid, c=c, max_iter=max_iter, tol=tol, phase=phase, refine=refine,
             keep_best=keep_best, progress=bar, **options,
         )  # fmt: skip
+    watch.lap("compute")
     finish(result, output, json, quiet, watch)
     if result.method == "certified" and not result.certificate.certified:
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
@@ -232,7 +236,6 @@ def finish(
     from .._output import table
 
     certificate = getattr(result, "certificate", None)
-    watch.lap("compute")
     if certificate is None:
         certificate = _certified(result)
         watch.lap("certificate")

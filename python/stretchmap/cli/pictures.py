@@ -1,0 +1,106 @@
+"""Commands that draw: plot, report, demo."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from . import _common as common
+from ._common import Json, MapFile, Output, Quiet
+
+
+class Kind(str, Enum):
+    """Values of ``--kind``, the keys of ``stretchmap.plot.KINDS``."""
+
+    ratios = "ratios"
+    convergence = "convergence"
+    domain = "domain"
+    checkerboard = "checkerboard"
+    loops = "loops"
+    cutaway = "cutaway"
+
+
+class Sample(str, Enum):
+    """Values of ``--sample``."""
+
+    vertebra = "vertebra"
+    bumpy = "bumpy"
+    knot = "knot"
+    torus = "torus"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this module."""
+    for command in (plot, report, demo):
+        app.command()(command)
+
+
+def plot(
+    map_file: MapFile,
+    output: Output,
+    kind: Annotated[Kind, typer.Option(help="What to draw.")] = Kind.ratios,
+    dpi: Annotated[float, typer.Option(help="Dots per inch.", min=20.0, max=1200.0)] = 150.0,
+) -> None:
+    """Draw a picture of a map (.png, .pdf or .svg)."""
+    from ..plot import picture, save
+    from ..results import load_map
+
+    common.check_output(output, (".png", ".pdf", ".svg"), map_file)
+    common.require_package("matplotlib", "drawing", "plot")
+    save(picture(load_map(map_file), kind.value), output, dpi)
+
+
+def report(map_file: MapFile, output: Output) -> None:
+    """Write one self-contained .html page about a map: figures, certificate, pictures."""
+    from ..report import write_report
+    from ..results import load_map
+
+    common.check_output(output, (".html", ".htm"), map_file)
+    common.require_package("matplotlib", "drawing", "plot")
+    write_report(load_map(map_file), output, source=map_file.name)
+
+
+def demo(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for the results, made if missing.")
+    ] = Path("stretchmap-demo"),
+    sample: Annotated[Sample, typer.Option(help="Which solid.")] = Sample.vertebra,
+    n_tets: Annotated[int, typer.Option(help="Number of tets aimed at.", min=300)] = 30_000,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> None:
+    """Generate a solid, map it onto the solid torus, draw it; needs no data."""
+    from .. import plot, samples
+    from ..progress import terminal
+    from ..volume import volume_map
+    from .maps import finish
+
+    common.require_package("matplotlib", "the demo's pictures", "plot")
+    if output.exists() and not output.is_dir():
+        raise NotADirectoryError(20, "is a file, not a folder", str(output))
+    if json is not None:
+        common.check_output(json, (json.suffix.lower(),))
+    makers = {
+        Sample.vertebra: samples.vertebra_like,
+        Sample.bumpy: samples.bumpy_torus,
+        Sample.knot: samples.knot_tube,
+        Sample.torus: samples.solid_torus,
+    }
+    watch = common.Stopwatch()
+    solid = makers[sample](n_tets)
+    watch.lap("sample")
+    with terminal(quiet) as bar:
+        result = volume_map(solid, progress=bar)
+    watch.lap("compute")
+    histogram, torus = plot.ratios(result), plot.cutaway(result)
+    watch.lap("pictures")
+    output.mkdir(parents=True, exist_ok=True)
+    common.check_output(output / "map.npz", (".npz",))
+    finish(result, output / "map.npz", json, quiet, watch)
+    for figure, name in ((histogram, "ratios.png"), (torus, "torus.png")):
+        plot.save(figure, output / name)
+        if not quiet:
+            typer.echo(f"written to {output / name}")
