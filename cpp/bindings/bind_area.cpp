@@ -130,10 +130,12 @@ void bind_glide(py::module_& m) {
           py::arg("area"), py::arg("shape"), py::arg("chart"), release_gil())
       .def(
           "project_rings",
-          [](SurfaceNewton& self, double area, double shape, double chart, double face_goal) {
-            return self.project_rings(weights_of(area, shape, chart), face_goal);
+          [](SurfaceNewton& self, double area, double shape, double chart, double face_sd,
+             double face_error) {
+            return self.project_rings(weights_of(area, shape, chart), face_sd, face_error);
           },
-          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("face_goal"), release_gil())
+          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("face_sd"),
+          py::arg("face_error"), release_gil())
       .def("figures", &SurfaceNewton::figures, release_gil())
       .def_property_readonly("angles", &SurfaceNewton::angles);
 }

@@ -38,7 +38,7 @@ _STALLED = 3  # steps in a row without any length end the iteration
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
 _MARGIN = 0.8  # the Newton steps go on to this part of tol: the projection of the rings needs some
 _FAIR = 4.0  # from this face SD on, in units of tol, the shape budget counts
-_RING_WEIGHT = 1e3  # most weight of the area term in the projection of the rings
+_RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 _SAMPLE = 6000  # faces that suffice for the search
 
 _PHASES = 36  # first round of the search around the tube
@@ -152,8 +152,8 @@ def area_map(
         together with ``torus``.
     finish : "ring", "face" or "none"
         ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then a
-        projection that makes the area of every vertex ring exact, kept if the deviation of the
-        faces stays below ``tol`` or does not grow. ``"none"``: the chart's map as it is.
+        projection that makes the area of every vertex ring exact, kept if the faces stay within
+        ``tol`` or do not get worse. ``"none"``: the chart's map as it is.
     max_iter : int
         Most Newton steps.
     tol : float
@@ -406,7 +406,9 @@ def _finish(
             reason = "shape budget spent"
             break
     weight = min(weight, _RING_WEIGHT)
-    if rings and newton.project_rings(1.0, _SHAPE / weight, _CHART / weight, tol):
+    if rings and newton.project_rings(
+        1.0, _SHAPE / weight, _CHART / weight, tol, _RATIO_GOAL * tol
+    ):
         history.append(_record(len(history), None, newton.figures(), start))
     figures = newton.figures()
     if _within(figures, tol):

@@ -14,7 +14,8 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586476925287;
 constexpr double kArmijo = 1e-4;
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
-constexpr int kRingSteps = 3;        // of each kind
+constexpr int kBestSteps = 2;        // towards it, of each kind
+constexpr int kStiffSteps = 4;
 constexpr int kHalvings = 30;
 constexpr double kRidge = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
@@ -99,25 +100,25 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
   return longest;
 }
 
-bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_goal) {
+bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd,
+                                  double face_error) {
   if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
   const SurfaceFigures before = figures();
+  const auto take = [&](RingStep kind) {
+    const Points2 direction =
+        rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind);
+    angles_ += longest_step(direction) * direction;
+    return figures();
+  };
   SurfaceFigures now = before;
-  for (const RingStep kind : {RingStep::kBest, RingStep::kSmallest})
-    for (int step = 0; step < kRingSteps && now.ring_sd > kRingGoal; ++step) {
-      const Points2 last = angles_;
-      const Points2 direction =
-          rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind);
-      angles_ += std::min(1.0, longest_step(direction)) * direction;
-      const SurfaceFigures next = figures();
-      if (!(next.flips == 0 && next.ring_sd < 0.9 * now.ring_sd)) {
-        angles_ = last;
-        break;
-      }
-      now = next;
-    }
-  if (now.ring_sd <= kRingGoal && now.face_sd <= std::max(before.face_sd, face_goal)) return true;
+  for (int step = 0; step < kBestSteps; ++step) now = take(RingStep::kBest);
+  for (int step = 0; step < kStiffSteps && now.ring_sd > kRingGoal; ++step)
+    now = take(RingStep::kStiff);
+  if (now.flips == 0 && now.ring_sd <= kRingGoal &&
+      now.face_sd <= std::max(before.face_sd, face_sd) &&
+      now.face_error <= std::max(before.face_error, face_error))
+    return true;
   angles_ = start;
   return false;
 }

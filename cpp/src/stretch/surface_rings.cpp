@@ -39,18 +39,6 @@ Rings measure(const GlideProblem& problem, const Points2Ref& angles) {
   return rings;
 }
 
-// Half the squared length of a change, each vertex counted once per face: derivatives at zero.
-GlideEnergy squared_length(const GlideProblem& problem, const Points2Ref& angles) {
-  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
-  const Faces& faces = problem.chart.faces;
-  GlideEnergy energy{0.0, Vec::Zero(angles.size()), Rows::Zero(faces.rows(), 36)};
-  for (Index f = 0; f < faces.rows(); ++f)
-    for (int k = 0; k < 3; ++k)
-      for (int c = 0; c < 2; ++c)
-        energy.hessians(f, 7 * (2 * k + c)) = points[faces(f, k)].tangent.col(c).squaredNorm();
-  return energy;
-}
-
 // Faces' parts of the system, rows and columns ordered (u, v, multiplier) corner by corner.
 Rows elements(const GlideProblem& problem, const Rings& rings, const Rows& hessians) {
   using NineNine = Eigen::Matrix<double, 9, 9>;
@@ -78,9 +66,10 @@ Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weig
                          const Points2Ref& angles, RingStep kind) {
   const Index n = problem.chart.n_vertices;
   const Rings rings = measure(problem, angles);
-  const GlideEnergy energy =
-      kind == RingStep::kBest ? glide_energy(problem, weights, scale, angles, Derivatives::kModel)
-                              : squared_length(problem, angles);
+  SurfaceWeights model = weights;
+  if (kind == RingStep::kStiff) model.area = 0.0;
+  GlideEnergy energy = glide_energy(problem, model, scale, angles, Derivatives::kModel);
+  if (kind == RingStep::kStiff) energy.gradient.setZero();
   SparseMatrix matrix = pattern_.zeros();
   pattern_.scatter(elements(problem, rings, energy.hessians), matrix.valuePtr());
   Vec diagonal = matrix.diagonal();

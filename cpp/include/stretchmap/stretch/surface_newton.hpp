@@ -28,10 +28,10 @@ class SurfaceNewton {
   // The scale of the areas is renewed first, which lowers the energy by itself.
   GlideStep step(const SurfaceWeights& weights);
 
-  // Makes the ring areas exact by steps along ring_step, first the best ones, then the shortest.
-  // Refused (false, nothing changed) if that cannot be done or raises the deviation of the faces
-  // above both what it was and face_goal.
-  bool project_rings(const SurfaceWeights& weights, double face_goal);
+  // Makes the ring areas exact: two steps of RingSystem that are best for the faces, then stiff
+  // ones. Refused (false, nothing changed) if that cannot be done without a flip or raises a
+  // figure of the faces above both what it was and the limit given.
+  bool project_rings(const SurfaceWeights& weights, double face_sd, double face_error);
 
   // Of the polyhedral image.
   SurfaceFigures figures() const;

@@ -9,8 +9,8 @@
 namespace stretchmap {
 
 enum class RingStep {
-  kBest,     // best for the quadratic model of the energy
-  kSmallest  // shortest, lengths measured on the torus
+  kBest,  // best for the quadratic model of the energy
+  kStiff  // smallest when shape and chart are springs
 };
 
 // The equations of one step, three unknowns per vertex (u, v and the multiplier of its ring); the
@@ -20,7 +20,7 @@ class RingSystem {
   RingSystem(const FacesRef& faces, Index n_vertices) : pattern_(faces, n_vertices, 3) {}
 
   // The change of the angles, (n, 2), that makes the area of every vertex ring (6.3) its share of
-  // the total to first order and, among all that do, is best for the energy or shortest:
+  // the total to first order and, among all that do, is best for the energy or smallest:
   //   [ H  J' ] [ dq ]   [ -g ]
   //   [ J  0  ] [ mu ] = [ -r ]
   // \throws Error "SolverError" when the factorisation breaks down.
