@@ -283,7 +283,8 @@ def _minimise_stretch(
     if (_core.turn_areas(chart, turns) <= 0.0).any():
         # Positive weights embed the surface in a flat torus whatever its triangles (Tutte).
         weights = np.ones(len(surface.edges))
-        turns = _core.harmonic_forms(surface.topology, weights, conformal.forms.astype(float))[1]
+        forms = conformal.forms.astype(float)
+        turns = _core.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
     sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, turns)
     history: list[IterationRecord] = []
     taken = None
