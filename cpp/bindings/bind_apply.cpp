@@ -1,6 +1,7 @@
 #include "arrays.hpp"
 #include "stretchmap/apply/chart_locator.hpp"
 #include "stretchmap/apply/split_tets.hpp"
+#include "stretchmap/apply/surface_match.hpp"
 #include "stretchmap/apply/tet_locator.hpp"
 
 namespace stretchmap::bindings {
@@ -27,6 +28,19 @@ void bind_apply(py::module_& m) {
             return std::make_pair(std::move(found.face), std::move(found.weights));
           },
           py::arg("queries").noconvert(), release_gil());
+
+  m.def("match_value", &match_value, py::arg("chart"), py::arg("y").noconvert(),
+        py::arg("X").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
+        release_gil());
+  m.def(
+      "match_model",
+      [](const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X, const RowsRef& rest,
+         const VecRef& weights) {
+        MatchModel model = match_model(chart, y, X, rest, weights);
+        return std::make_pair(std::move(model.gradient), std::move(model.hessian));
+      },
+      py::arg("chart"), py::arg("y").noconvert(), py::arg("X").noconvert(),
+      py::arg("rest").noconvert(), py::arg("weights").noconvert(), release_gil());
 
   py::class_<TetSplit>(m, "TetSplit")
       .def_readonly("tets", &TetSplit::tets)

@@ -49,6 +49,7 @@ _EXPORTS = {
     "forward": "coordinates",
     "inverse": "coordinates",
     "torus_coordinates": "coordinates",
+    "partition": "partitions",
 }
 _MODULES = {"errors", "samples", "plot"}
 

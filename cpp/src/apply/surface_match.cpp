@@ -1,0 +1,80 @@
+#include "stretchmap/apply/surface_match.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "stretchmap/stretch/element_energy.hpp"
+
+namespace stretchmap {
+namespace {
+
+Eigen::Matrix2d chart_edges(const SurfaceChart& chart, const Points2Ref& y, Index f) {
+  const Eigen::Vector2d origin = chart.corner(y, f, 0);
+  Eigen::Matrix2d edges;
+  edges << chart.corner(y, f, 1) - origin, chart.corner(y, f, 2) - origin;
+  return edges;
+}
+
+// Edges of the image triangle in its own plane, the first along x.
+Eigen::Matrix2d plane_edges(const SurfaceChart& chart, const PointsRef& X, Index f) {
+  const Eigen::RowVector3d a = X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0));
+  const Eigen::RowVector3d b = X.row(chart.faces(f, 2)) - X.row(chart.faces(f, 0));
+  const double base = a.norm();
+  Eigen::Matrix2d edges;
+  edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
+  return edges;
+}
+
+Eigen::Matrix2d rest_of(const RowsRef& rest, Index f) {
+  Eigen::Matrix2d matrix;
+  matrix << rest(f, 0), rest(f, 1), rest(f, 2), rest(f, 3);
+  return matrix;
+}
+
+}  // namespace
+
+double match_value(const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                   const RowsRef& rest, const VecRef& weights) {
+  double total = 0.0;
+  for (Index f = 0; f < chart.faces.rows(); ++f) {
+    if (!(chart_edges(chart, y, f).determinant() > 0.0))
+      return std::numeric_limits<double>::infinity();
+    total += weights[f] * face_energy(plane_edges(chart, X, f) * rest_of(rest, f));
+  }
+  return total;
+}
+
+MatchModel match_model(const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                       const RowsRef& rest, const VecRef& weights) {
+  const Index n = static_cast<Index>(y.rows()), m = static_cast<Index>(chart.faces.rows());
+  MatchModel model{Vec::Zero(2 * n), SparseMatrix(2 * n, 2 * n)};
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  entries.reserve(36 * static_cast<std::size_t>(m));
+  for (Index f = 0; f < m; ++f) {
+    const Eigen::Matrix2d P = plane_edges(chart, X, f), R = rest_of(rest, f);
+    const Eigen::Matrix2d S = P * chart_edges(chart, y, f).inverse();
+    Eigen::Matrix2d slope;
+    Matrix4 curvature;
+    face_energy(P * R, slope, curvature);
+    // vec(K) = D vec(y), y the six chart coordinates of the corners.
+    Eigen::Matrix<double, 3, 2> G;
+    G << 0.0, 0.0, R(0, 0), R(0, 1), R(1, 0), R(1, 1);
+    G.row(0) = -(G.row(1) + G.row(2));
+    Eigen::Matrix<double, 4, 6> D;
+    for (int a = 0; a < 3; ++a)
+      for (int k = 0; k < 2; ++k) D.block<2, 2>(2 * k, 2 * a) = S * G(a, k);
+    const Eigen::Map<const Eigen::Vector4d> flat(slope.data());
+    const Eigen::Matrix<double, 6, 1> g = weights[f] * (D.transpose() * flat);
+    const Eigen::Matrix<double, 6, 6> H = weights[f] * (D.transpose() * curvature * D);
+    for (int a = 0; a < 6; ++a) {
+      const Index row = 2 * chart.faces(f, a / 2) + a % 2;
+      model.gradient[row] += g[a];
+      for (int b = 0; b < 6; ++b)
+        entries.emplace_back(row, 2 * chart.faces(f, b / 2) + b % 2, H(a, b));
+    }
+  }
+  model.hessian.setFromTriplets(entries.begin(), entries.end());
+  return model;
+}
+
+}  // namespace stretchmap
