@@ -65,6 +65,8 @@ void bind_volume(py::module_& m) {
   py::class_<EnergyReport>(m, "EnergyReport")
       .def_readonly("energy", &EnergyReport::energy)
       .def_readonly("min_det", &EnergyReport::min_det)
+      .def_readonly("min_facing", &EnergyReport::min_facing)
+      .def_readonly("folds", &EnergyReport::folds)
       .def_readonly("flips", &EnergyReport::flips);
   py::class_<NewtonReport>(m, "NewtonReport")
       .def_readonly("before", &NewtonReport::before)
@@ -135,13 +137,17 @@ void bind_volume(py::module_& m) {
         py::arg("scale"), release_gil());
   m.def(
       "face_energy",
-      [](const Eigen::Matrix2d& K) {
-        Eigen::Matrix2d P;
-        Matrix4 H;
-        const double value = face_energy(K, P, H);
-        return std::make_tuple(value, P, H);
+      [](const PointsRef& x, const FacesRef& faces, const RowsRef& rest, double R, double r,
+         double epsilon) {
+        const BoundaryBarrier barrier(faces, rest, Vec::Ones(faces.rows()), R, r);
+        Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
+        Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
+        barrier.linearise(x, 0, epsilon, gradient, hessian);
+        return std::make_tuple(barrier.value(x, 0, epsilon).energy, gradient, hessian);
       },
-      py::arg("K"), "Energy, gradient and projected Hessian of one boundary triangle.");
+      py::arg("x").noconvert(), py::arg("faces").noconvert(), py::arg("rest").noconvert(),
+      py::arg("R"), py::arg("r"), py::arg("epsilon"),
+      "Energy, gradient and model Hessian of the first boundary triangle, for checks.");
   m.def("rest_matrices", &rest_matrices, py::arg("V").noconvert(), py::arg("tets").noconvert(),
         py::arg("max_aspect"), release_gil());
   m.def("signed_tet_volumes", &signed_tet_volumes, py::arg("x").noconvert(),

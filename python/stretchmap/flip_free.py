@@ -24,6 +24,7 @@ from .results import IterationRecord
 __all__ = ["FlipFreeOptions", "FlipFreeSolver"]
 
 _FREE, _FIXED, _GLIDING = 0, 1, 2
+_PATIENCE = 10  # untangling steps without progress before something else is tried
 _NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
 
 
@@ -46,6 +47,9 @@ class FlipFreeOptions:
         slivers: their shape is not asked to be kept.
     untangle_iter, frozen_iter, glide_iter : int
         Most steps of each stage.
+    floor : float
+        Least determinant untangling aims for: a start closer to folding than that makes the barrier
+        too steep for rounded arithmetic.
     tol : float
         At the largest lambda: stop when a step lowers the energy by no more than this share.
     exact_sd_factor : float
@@ -62,6 +66,7 @@ class FlipFreeOptions:
     untangle_iter: int = 200
     frozen_iter: int = 60
     glide_iter: int = 60
+    floor: float = 1e-3
     tol: float = 2e-3
     exact_sd_factor: float = 1.25
     cg_tol: float = 0.1
@@ -150,38 +155,48 @@ class FlipFreeSolver:
             self.progress, stage, iteration, total, flips=record.flips, element_sd=record.element_sd
         )
 
-    def untangle(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-        """Turn every inverted tet, boundary held: foldover-free mapping by continuation.
+    def untangle(self, x: NDArray[np.float64], *, glide: bool) -> tuple[NDArray[np.float64], int]:
+        """Turn every inverted tet: foldover-free mapping by continuation.
 
-        The regularisation epsilon follows the worst determinant down (Garanzha et al., 2021,
-        section 3.2); between two steps the energy may rise because epsilon changed, within a step
-        it cannot.
+        First with the boundary held; if ``glide`` and inverted tets or folded boundary faces are
+        left, with a gliding boundary. The regularisation epsilon follows the worst determinant down
+        (Garanzha et al., 2021, section 3.2); between two steps the energy may rise because epsilon
+        changed, within a step it cannot.
 
         Returns
         -------
         x : ndarray, shape (n, 3)
         flips : int
-            Tets still inverted; zero means success.
+            Inverted tets, and folded faces if ``glide``, that are left; zero means success.
         """
+        x, left = self._untangle(x, glide=False)
+        if glide:
+            x, left = self._untangle(x, glide=True)
+        return x, left
+
+    def _untangle(self, x: NDArray[np.float64], *, glide: bool) -> tuple[NDArray[np.float64], int]:
         o = self.options
-        newton = self._newton(x, _FIXED)
+        face = o.face_weight if glide else 0.0
+        newton = self._newton(x, _GLIDING if glide else _FIXED)
         clock = time.perf_counter()
-        state = newton.value(x, _core.EnergyWeights(1.0, 1.0, 1.0))
-        if state.flips == 0:
-            return x, 0
-        epsilon = max(0.2 * abs(state.min_det), 1e-6)
+        state = newton.value(x, _core.EnergyWeights(1.0, 1.0, 1.0, face))
+        left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
+        fewest, since = left, 0
+        epsilon = max(0.2 * abs(worst), 10.0 * o.floor)
         for iteration in range(1, o.untangle_iter + 1):
-            x, step = newton.step(
-                x, _core.EnergyWeights(1.0, 1.0, epsilon), min(o.cg_tol, 1e-2), o.max_cg
-            )
+            if (left == 0 and (worst >= o.floor or since >= _PATIENCE)) or since >= 3 * _PATIENCE:
+                break
+            weights = _core.EnergyWeights(1.0, 1.0, epsilon, face)
+            x, step = newton.step(x, weights, min(o.cg_tol, 1e-2), o.max_cg)
             after = step.after
             self._record(
                 "untangle", iteration, x, after.energy, step.alpha, epsilon, clock, o.untangle_iter
             )
-            if after.flips == 0:
-                return x, 0
-            epsilon = _next_epsilon(epsilon, step.before.energy, after.energy, after.min_det)
-        return x, int(after.flips)
+            left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
+            since = 0 if left < fewest else since + 1
+            fewest = min(fewest, left)
+            epsilon = _next_epsilon(epsilon, step.before.energy, after.energy, worst)
+        return x, int(left)
 
     def minimise(
         self, x: NDArray[np.float64], *, glide: bool, start: float, goal: float
@@ -266,9 +281,9 @@ class FlipFreeSolver:
         return moved, True, ""
 
 
-def _next_epsilon(epsilon: float, before: float, after: float, min_det: float) -> float:
+def _next_epsilon(epsilon: float, before: float, after: float, worst: float) -> float:
     """Regularisation for the next step, from the decrease achieved and the worst determinant."""
     gain = max(0.1, 1.0 - after / before)
-    chi = 0.5 * (min_det + math.sqrt(epsilon * epsilon + min_det * min_det))
+    chi = 0.5 * (worst + math.sqrt(epsilon * epsilon + worst * worst))
     goal = (1.0 - gain) * chi
-    return max(2.0 * math.sqrt(goal * (goal - min_det)), 1e-12) if min_det < goal else 1e-12
+    return 2.0 * math.sqrt(max(goal * (goal - worst), 1e-24))

@@ -202,7 +202,11 @@ def volume_map(
         clock = time.perf_counter()
         if ratio is None:
             ratio = "search" if certified else "conformal"
-        boundary_map = area_map(solid.surface, ratio=ratio, phase=phase, progress=progress)
+        # A gliding boundary loses the exact areas again; a held one is only as good as them.
+        finish = "none" if certified and boundary != "frozen" else "ring"
+        boundary_map = area_map(
+            solid.surface, ratio=ratio, phase=phase, finish=finish, progress=progress
+        )
         seconds["boundary"] = time.perf_counter() - clock
 
     refinement = None
@@ -395,11 +399,11 @@ def _certified_map(
         progress=progress,
     )
     clock = time.perf_counter()
-    x, flips = flip_free.untangle(x)
+    glide = boundary == "glide"
+    x, flips = flip_free.untangle(x, glide=glide)
     seconds["untangle"] = time.perf_counter() - clock
-    converged, stop_reason = False, f"{flips} tets could not be untangled"
+    converged, stop_reason = False, f"{flips} tets and faces could not be untangled"
     if flips == 0:
-        glide = boundary == "glide"
         clock = time.perf_counter()
         goal = options.frozen_weight if glide else options.volume_weight
         if not (problem.warm and glide):

@@ -83,3 +83,79 @@ def test_rank_deficient_elements_are_finite_when_regularised(rank):
     energy, P, H = _core.element_energy(J, _core.EnergyWeights(1.0, 1.0, 0.5))
     assert np.isfinite(energy) and np.isfinite(P).all() and np.isfinite(H).all()
     assert np.linalg.eigvalsh(H).min() > -1e-9 * np.abs(H).max()
+
+
+def on_torus(angles, R, r):
+    u, v = angles[:, 0], angles[:, 1]
+    rho = R + r * np.cos(v)
+    return np.column_stack([rho * np.cos(u), rho * np.sin(u), r * np.sin(v)])
+
+
+def face_case(folded):
+    R, r = 2.0, 0.7
+    angles = np.array([[0.3, 0.4], [0.55, 0.5], [0.4, 0.8]])
+    if folded:
+        angles[2] = [0.45, 0.35]
+    faces = np.array([[0, 1, 2]], np.int32)
+    rest = _core.rest_triangles(np.array([[0.0, 0, 0], [0.5, 0.1, 0], [0.1, 0.4, 0.2]]), faces, 1.1)
+    return R, r, angles, faces, rest
+
+
+@pytest.mark.parametrize(("epsilon", "folded"), [(0.0, False), (0.4, False), (0.4, True)])
+def test_face_gradient_is_by_arc_length_along_the_coordinate_circles(epsilon, folded):
+    R, r, angles, faces, rest = face_case(folded)
+    _, gradient, hessian = _core.face_energy(on_torus(angles, R, r), faces, rest, R, r, epsilon)
+    h = 1e-6
+    for i in range(3):
+        metric = (R + r * np.cos(angles[i, 1]), r)
+        for j in range(2):
+            energies = []
+            for sign in (1, -1):
+                moved = angles.copy()
+                moved[i, j] += sign * h / metric[j]
+                image = on_torus(moved, R, r)
+                energies.append(_core.face_energy(image, faces, rest, R, r, epsilon)[0])
+            slope = (energies[0] - energies[1]) / (2 * h)
+            assert slope == pytest.approx(gradient[2 * i + j], rel=1e-6, abs=1e-7)
+    assert np.linalg.eigvalsh(hessian).min() > -1e-10 * np.abs(hessian).max()
+
+
+def test_folded_face_is_infinitely_bad_without_regularisation():
+    R, r, angles, faces, rest = face_case(folded=True)
+    assert _core.face_energy(on_torus(angles, R, r), faces, rest, R, r, 0.0)[0] == np.inf
+
+
+@pytest.mark.parametrize("glide", [False, True])
+def test_newton_step_predicts_the_decrease_it_makes(glide):
+    """decrement = gradient . H^-1 gradient, so a short step lowers the energy by step * decrement."""
+    from stretchmap import samples
+
+    solid = samples.solid_torus(600, R=2.0, r=1.0)
+    V, T = solid.V / solid.volume ** (1 / 3), solid.T
+    scale = solid.volume ** (1 / 3)
+    R, r = 2.0 / scale, 1.0 / scale
+    motion = np.zeros(len(V), np.uint8)
+    motion[solid.boundary_vertices] = 2 if glide else 1
+    u = np.arctan2(V[:, 1], V[:, 0])
+    v = np.arctan2(V[:, 2], np.hypot(V[:, 0], V[:, 1]) - R)
+    s = np.hypot(V[:, 2], np.hypot(V[:, 0], V[:, 1]) - R)
+    if glide:  # slide the whole picture so that the boundary has somewhere to go
+        u, v = u + 0.1 * np.sin(2 * u), v + 0.1 * np.cos(u)
+    rho = R + s * np.cos(v)
+    x = np.column_stack([rho * np.cos(u), rho * np.sin(u), s * np.sin(v)])
+    inner = np.setdiff1d(np.arange(len(V)), solid.boundary_vertices)
+    x[inner] += 0.01 * r * RNG.standard_normal((len(inner), 3))
+    shares = solid.tet_volumes / solid.volume
+    faces = solid.boundary_vertices[solid.surface.F]
+    face_rest = _core.rest_triangles(V, faces, 1.0)
+    newton = _core.SolidNewton(
+        T, _core.rest_matrices(V, T, 6.0), shares, motion, R, r, x, faces, face_rest,
+        np.full(len(faces), 1.0 / len(faces)),
+    )  # fmt: skip
+    w = _core.EnergyWeights(1.0, 3.0, 0.0, 1.0 if glide else 0.0)
+    moved, report = newton.step(x, w, 1e-10, 2000)
+    assert report.alpha >= 1.0 and report.after.energy < report.before.energy
+    # Repeated steps converge to a point where the gradient vanishes.
+    for _ in range(60):
+        moved, report = newton.step(moved, w, 1e-8, 2000)
+    assert report.decrement < 1e-9 * report.before.energy

@@ -3,16 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace stretchmap {
-namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+using Eigen::Vector3d;
 
-double wrapped(double angle) { return std::remainder(angle, 2.0 * kPi); }
-
-}  // namespace
+struct BoundaryBarrier::State {
+  std::array<Vector3d, 3> x, normal, e_u, e_v;
+  std::array<double, 3> rho, cos_v;
+  Eigen::Matrix<double, 3, 2> G;  // J = sum_i x_i G.row(i)
+  Eigen::Matrix<double, 3, 2> J;
+  Vector3d area;        // area vector over the rest area
+  double inverse_area;  // 1 / rest area
+  Vector3d sigma;
+};
 
 BoundaryBarrier::BoundaryBarrier(Faces faces, Rows rest, Vec weights, double R, double r)
     : faces_(std::move(faces)),
@@ -21,59 +27,81 @@ BoundaryBarrier::BoundaryBarrier(Faces faces, Rows rest, Vec weights, double R, 
       R_(R),
       r_(r) {}
 
-Eigen::Matrix2d BoundaryBarrier::jacobian(const PointsRef& x, Index f) const {
-  std::array<double, 3> u, s;
-  for (int a = 0; a < 3; ++a) {
-    const auto p = x.row(faces_(f, a));
-    u[a] = std::atan2(p[1], p[0]);
-    s[a] = std::atan2(p[2], std::hypot(p[0], p[1]) - R_) + p[2] / R_;  // r sin v = z
+BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, Index f) const {
+  State s;
+  for (int k = 0; k < 3; ++k) {
+    s.x[k] = x.row(faces_(f, k)).transpose();
+    s.rho[k] = std::hypot(s.x[k][0], s.x[k][1]);
+    const double cu = s.x[k][0] / s.rho[k], su = s.x[k][1] / s.rho[k];
+    const double cv = (s.rho[k] - R_) / r_, sv = s.x[k][2] / r_;
+    s.cos_v[k] = cv;
+    s.e_u[k] << -su, cu, 0.0;
+    s.e_v[k] << -sv * cu, -sv * su, cv;
+    s.normal[k] << cv * cu, cv * su, sv;
   }
-  Eigen::Matrix2d edges;
-  for (int a = 1; a < 3; ++a)
-    edges.col(a - 1) << R_ * wrapped(u[a] - u[0]), r_ * wrapped(s[a] - s[0]);
-  Eigen::Matrix2d rest;
-  rest << rest_(f, 0), rest_(f, 1), rest_(f, 2), rest_(f, 3);
-  return edges * rest;
+  s.G << 0.0, 0.0, rest_(f, 0), rest_(f, 1), rest_(f, 2), rest_(f, 3);
+  s.G.row(0) = -(s.G.row(1) + s.G.row(2));
+  s.J.setZero();
+  for (int k = 0; k < 3; ++k) s.J += s.x[k] * s.G.row(k);
+  s.inverse_area = 2.0 * (rest_(f, 0) * rest_(f, 3) - rest_(f, 1) * rest_(f, 2));
+  s.area = 0.5 * s.inverse_area * (s.x[1] - s.x[0]).cross(s.x[2] - s.x[0]);
+  for (int k = 0; k < 3; ++k) s.sigma[k] = s.area.dot(s.normal[k]);
+  return s;
 }
 
-double BoundaryBarrier::value(const PointsRef& x, Index f) const {
-  return weights_[f] * face_energy(jacobian(x, f));
+FaceReport BoundaryBarrier::value(const PointsRef& x, Index f, double epsilon) const {
+  const State s = state(x, f);
+  FaceReport report;
+  report.facing = s.sigma.minCoeff();
+  if (epsilon <= 0.0 && !(report.facing > 0.0)) {
+    report.energy = std::numeric_limits<double>::infinity();
+    return report;
+  }
+  const double I = s.J.squaredNorm();
+  for (const double sigma : s.sigma)
+    report.energy += 0.5 * (I + sigma * sigma + 1.0) / regularised(sigma, epsilon).value - 2.0;
+  report.energy *= weights_[f] / 3.0;
+  return report;
 }
 
-void BoundaryBarrier::linearise(const PointsRef& x, Index f, Eigen::Matrix<double, 6, 1>& gradient,
+void BoundaryBarrier::linearise(const PointsRef& x, Index f, double epsilon,
+                                Eigen::Matrix<double, 6, 1>& gradient,
                                 Eigen::Matrix<double, 6, 6>& hessian) const {
-  Eigen::Matrix2d P;
-  Matrix4 H;
-  face_energy(jacobian(x, f), P, H);
-  P *= weights_[f];
-  H *= weights_[f];
-  Eigen::Matrix<double, 3, 2> G;  // derivative of K's columns by the chart vertices
-  G << 0.0, 0.0, rest_(f, 0), rest_(f, 1), rest_(f, 2), rest_(f, 3);
-  G.row(0) = -(G.row(1) + G.row(2));
-
-  // Chart position by arc length: dU = (R / rho) dp, dS = (rho / R) dq, d2S = -(sin v / R) dq^2.
-  Eigen::Matrix<double, 6, 1> scale, bend;
-  for (int a = 0; a < 3; ++a) {
-    const auto p = x.row(faces_(f, a));
-    const double rho = std::hypot(p[0], p[1]);
-    scale.segment<2>(2 * a) << R_ / rho, rho / R_;
-    bend.segment<2>(2 * a) << 0.0, -p[2] / (r_ * R_);
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  const State s = state(x, f);
+  Matrix6 jacobian;  // of vec(J) by the six unknowns
+  for (int k = 0; k < 3; ++k) {
+    for (int c = 0; c < 2; ++c) {
+      jacobian.block<3, 1>(3 * c, 2 * k) = s.G(k, c) * s.e_u[k];
+      jacobian.block<3, 1>(3 * c, 2 * k + 1) = s.G(k, c) * s.e_v[k];
+    }
   }
-  for (int a = 0; a < 3; ++a) {
-    const Eigen::Vector2d g = P * G.row(a).transpose();
-    for (int i = 0; i < 2; ++i) {
-      const int row = 2 * a + i;
-      gradient[row] += scale[row] * g[i];
-      hessian(row, row) += std::max(0.0, bend[row] * g[i]);
+  const Eigen::Map<const Vector6> J(s.J.data());
+  const Vector6 slope = jacobian.transpose() * J;  // half the gradient of |J|^2
+  const Matrix6 square = jacobian.transpose() * jacobian;
+  const double I = s.J.squaredNorm(), weight = weights_[f] / 3.0;
+
+  for (int k = 0; k < 3; ++k) {
+    Vector6 d;  // gradient of sigma_k
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d by_x =
+          0.5 * s.inverse_area * (s.x[(i + 1) % 3] - s.x[(i + 2) % 3]).cross(s.normal[k]);
+      d[2 * i] = by_x.dot(s.e_u[i]);
+      d[2 * i + 1] = by_x.dot(s.e_v[i]);
     }
-    for (int b = 0; b < 3; ++b) {
-      Eigen::Matrix2d block = Eigen::Matrix2d::Zero();
-      for (int k = 0; k < 2; ++k)
-        for (int l = 0; l < 2; ++l) block += G(a, k) * G(b, l) * H.block<2, 2>(2 * k, 2 * l);
-      for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j)
-          hessian(2 * a + i, 2 * b + j) += scale[2 * a + i] * block(i, j) * scale[2 * b + j];
-    }
+    d[2 * k] += s.cos_v[k] / s.rho[k] * s.area.dot(s.e_u[k]);
+    d[2 * k + 1] += s.area.dot(s.e_v[k]) / r_;
+
+    const double sigma = s.sigma[k], N = I + sigma * sigma + 1.0;
+    const Regularised chi = regularised(sigma, epsilon);
+    const double q = 1.0 / chi.value, t = chi.first * q;
+    gradient += weight * q * (slope + (sigma - 0.5 * N * t) * d);
+    // (J, sigma, chi) -> (|J|^2 + sigma^2 + 1) / (2 chi) is convex.
+    const Vector6 along = sigma * d;
+    hessian += weight * q *
+               (square + d * d.transpose() - t * (slope + along) * d.transpose() -
+                t * d * (slope + along).transpose() + t * t * N * d * d.transpose());
   }
 }
 

@@ -205,10 +205,16 @@ EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) cons
   EnergyReport report;
   report.energy = blocked_sum(energy);
   if (w.face > 0.0 && barrier_.size() > 0) {
-    Vec face(barrier_.size());
+    Vec face(barrier_.size()), facing(barrier_.size());
 #pragma omp parallel for schedule(static)
-    for (Index f = 0; f < barrier_.size(); ++f) face[f] = barrier_.value(x, f);
+    for (Index f = 0; f < barrier_.size(); ++f) {
+      const FaceReport there = barrier_.value(x, f, w.epsilon);
+      face[f] = there.energy;
+      facing[f] = there.facing;
+    }
     report.energy += w.face * blocked_sum(face);
+    report.min_facing = facing.minCoeff();
+    report.folds = static_cast<Index>((facing.array() <= 0.0).count());
   }
   report.min_det = k > 0 ? det.minCoeff() : 0.0;
   report.flips = static_cast<Index>((det.array() <= 0.0).count());
@@ -265,24 +271,24 @@ void SolidEnergy::linearise(const PointsRef& x, const EnergyWeights& w, Points& 
 #pragma omp parallel for schedule(static, 1)
   for (Index p = 0; p < parts; ++p) {
     for (const Index f : part_faces_[p])
-      add_face(x, w.face, f, part_row_[p], part_row_[p + 1], gradient, hessian.values.data());
+      add_face(x, w, f, part_row_[p], part_row_[p + 1], gradient, hessian.values.data());
   }
 }
 
 // Adds the boundary triangle's share to the rows in [first, last), which are in frames already.
-void SolidEnergy::add_face(const PointsRef& x, double weight, Index f, Index first, Index last,
-                           Points& gradient, double* blocks) const {
+void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, Index first,
+                           Index last, Points& gradient, double* blocks) const {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-  barrier_.linearise(x, f, g, H);
+  barrier_.linearise(x, f, w.epsilon, g, H);
   for (int a = 0; a < 3; ++a) {
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;
-    gradient.row(row).head<2>() += weight * g.segment<2>(2 * a).transpose();
+    gradient.row(row).head<2>() += w.face * g.segment<2>(2 * a).transpose();
     for (int b = 0; b < 3; ++b) {
       const Index at = find_block(row, vertex_row_[barrier_.faces()(f, b)]);
       Block(blocks + 9 * static_cast<std::ptrdiff_t>(at)).topLeftCorner<2, 2>() +=
-          weight * H.block<2, 2>(2 * a, 2 * b);
+          w.face * H.block<2, 2>(2 * a, 2 * b);
     }
   }
 }

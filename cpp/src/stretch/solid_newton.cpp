@@ -26,7 +26,8 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& w, const NewtonOp
   report.before = report.after = energy_.value(x, w);
   if (!std::isfinite(report.before.energy))
     throw Error("SolverError", "the energy is infinite: " + std::to_string(report.before.flips) +
-                                   " inverted tets; untangle first");
+                                   " inverted tets and " + std::to_string(report.before.folds) +
+                                   " folded boundary faces; untangle first");
   if (energy_.rows() == 0) return report;
 
   Points gradient;

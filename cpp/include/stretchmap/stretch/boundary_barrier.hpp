@@ -1,9 +1,16 @@
 // Energy of the boundary triangles while their vertices glide on the torus.
 //
-// Triangles are measured in the equal-area chart (R u, r s), s = v + (r / R) sin v, whose area
-// element is that of the torus: a triangle folds exactly when its chart area changes sign, and a
-// sum of face_energy over all triangles is a barrier against that. A tet alone does not see such a
-// fold.
+// Let a be the area vector of the flat image triangle, N_k the torus' outward normal at its k-th
+// corner, sigma_k = a . N_k over the rest area, and J (3x2) the Jacobian from the rest triangle.
+// Then
+//
+//   phi = 1/3 sum_k [ |J|^2 / (2 chi_k) - 1 + (sigma_k^2 + 1) / (2 chi_k) - 1 ],
+//
+// with chi_k = chi(sigma_k) as in element_energy.hpp. For epsilon = 0 it is infinite as soon as a
+// triangle faces inward at one of its corners: what keeps the boundary image a graph over the
+// torus. The tets alone do not see such a fold. |J|^2 / chi is convex in (J, chi), so the model
+// Hessian, which drops the curvature of sigma only, is positive semi-definite without any
+// projection.
 #pragma once
 
 #include "stretchmap/base/types.hpp"
@@ -11,27 +18,33 @@
 
 namespace stretchmap {
 
+struct FaceReport {
+  double energy = 0.0;  // +infinity where folded and epsilon = 0
+  double facing = 1.0;  // least sigma_k
+};
+
 class BoundaryBarrier {
  public:
   BoundaryBarrier() = default;
 
-  // faces (m, 3) index vertices of the solid; rest (m, 4) are row-major 2x2 inverse edge matrices
-  // of the source triangles, scaled so that det K = 1 means equal area; weights (m).
+  // faces (m, 3) index vertices of the solid; rest (m, 4) as from rest_triangles; weights (m);
+  // R and r are the radii of the torus.
   BoundaryBarrier(Faces faces, Rows rest, Vec weights, double R, double r);
 
   Index size() const { return static_cast<Index>(faces_.rows()); }
   const Faces& faces() const { return faces_; }
 
-  // Weighted energy of face f for vertices x (n, 3) on the torus; +infinity if it is folded.
-  double value(const PointsRef& x, Index f) const;
+  // Weighted energy of face f for vertices x (n, 3) on the torus.
+  FaceReport value(const PointsRef& x, Index f, double epsilon) const;
 
-  // Adds to `gradient` (6) and `hessian` (6, 6): derivatives by arc length along the coordinate
-  // circles (u, v) of the three vertices, the Hessian positive semi-definite.
-  void linearise(const PointsRef& x, Index f, Eigen::Matrix<double, 6, 1>& gradient,
+  // Adds to `gradient` and `hessian` the derivatives by arc length along the coordinate circles
+  // (u, v) of the three vertices.
+  void linearise(const PointsRef& x, Index f, double epsilon, Eigen::Matrix<double, 6, 1>& gradient,
                  Eigen::Matrix<double, 6, 6>& hessian) const;
 
  private:
-  Eigen::Matrix2d jacobian(const PointsRef& x, Index f) const;
+  struct State;
+  State state(const PointsRef& x, Index f) const;
 
   Faces faces_;
   Rows rest_;
@@ -39,8 +52,8 @@ class BoundaryBarrier {
   double R_ = 1.0, r_ = 0.5;
 };
 
-// Inverse edge matrices (m, 4) of the triangles, each in its own plane, as BoundaryBarrier wants
-// them. `scale` is image area over source area.
+// Inverse edge matrices (m, 4), row-major, of the triangles, each in its own plane and enlarged so
+// that the total area grows by the factor `scale` (image area over source area).
 // \pre all faces have positive area.
 Rows rest_triangles(const PointsRef& V, const FacesRef& faces, double scale);
 

@@ -9,6 +9,8 @@
 // (det + 1/det)/2 - 1: both are barriers against inversion and vanish at rotations.
 #pragma once
 
+#include <cmath>
+
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap {
@@ -16,9 +18,22 @@ namespace stretchmap {
 struct EnergyWeights {
   double shape = 1.0;
   double volume = 1.0;
-  double epsilon = 0.0;  // 0: barrier; the energy is infinite on inverted tets
+  double epsilon = 0.0;  // 0: barrier; the energy is infinite on inverted tets and folded faces
   double face = 0.0;     // of the boundary triangles, where the boundary glides
 };
+
+// chi(det) and its first two derivatives.
+struct Regularised {
+  double value, first, second;
+};
+
+inline Regularised regularised(double det, double epsilon) {
+  if (epsilon <= 0.0) return {det, 1.0, 0.0};
+  const double root = std::sqrt(epsilon * epsilon + det * det);
+  // For negative det the sum of the definition cancels; this is the same number.
+  const double chi = det >= 0.0 ? 0.5 * (det + root) : 0.5 * epsilon * epsilon / (root - det);
+  return {chi, chi / root, 0.5 * epsilon * epsilon / (root * root * root)};
+}
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
@@ -31,15 +46,5 @@ double element_energy(const Eigen::Matrix3d& J, const EnergyWeights& w);
 // \pre element_energy(J, w) is finite.
 double element_energy(const Eigen::Matrix3d& J, const EnergyWeights& w, Eigen::Matrix3d& P,
                       Matrix9* H);
-
-using Matrix4 = Eigen::Matrix<double, 4, 4>;
-
-// The same idea for a boundary triangle in a flat chart,
-//   phi(K) = tr(K^T K) / (2 det K) - 1 + (det K + 1 / det K) / 2 - 1,
-// a barrier against folding: +infinity when det K <= 0.
-double face_energy(const Eigen::Matrix2d& K);
-
-// Value, gradient and projected Hessian with respect to vec(K). \pre det K > 0.
-double face_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H);
 
 }  // namespace stretchmap

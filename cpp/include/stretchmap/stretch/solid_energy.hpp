@@ -25,7 +25,9 @@ enum Motion : std::uint8_t { kFree = 0, kFixed = 1, kGliding = 2 };
 struct EnergyReport {
   double energy = 0.0;  // +infinity if epsilon = 0 and a tet is inverted, or a face is folded
   double min_det = 0.0;
-  Index flips = 0;  // tets with det J <= 0
+  Index flips = 0;          // tets with det J <= 0
+  double min_facing = 1.0;  // least sigma_k of the gliding faces, see boundary_barrier.hpp
+  Index folds = 0;          // faces with one that is not positive
 };
 
 class SolidEnergy {
@@ -64,7 +66,7 @@ class SolidEnergy {
   Index find_block(Index row, Index column) const;  // position in col_
   void add_element(const PointsRef& x, const EnergyWeights& w, Index t, Index first, Index last,
                    Points& gradient, double* blocks) const;
-  void add_face(const PointsRef& x, double weight, Index f, Index first, Index last,
+  void add_face(const PointsRef& x, const EnergyWeights& w, Index f, Index first, Index last,
                 Points& gradient, double* blocks) const;
   void into_frames(const PointsRef& x, Index row, Points& gradient, double* blocks) const;
 
