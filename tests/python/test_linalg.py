@@ -255,6 +255,31 @@ def test_refactor_follows_the_values(backend, solid):
         solver.refactor(second.data[:-1])
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_units_do_not_matter(backend, solid):
+    """Powers of two far outside single precision's range change the digits not at all."""
+    points, tets, inner = solid
+    matrix = restrict(laplacian(points, tets), inner)
+    rhs = np.random.default_rng(0).standard_normal((len(inner), 3))
+    x, _ = _core.SpdSolver(matrix, backend).solve(rhs, np.zeros_like(rhs), 1e-9)
+    solver = _core.SpdSolver((matrix * 2.0**-200).tocsr(), backend)
+    y, _ = solver.solve(rhs * 2.0**200, np.zeros_like(rhs), 1e-9)
+    np.testing.assert_array_equal(y, x * 2.0**400)
+
+
+def test_an_old_preconditioner_serves_for_a_small_change(solid):
+    points, tets, inner = solid
+    rhs = np.random.default_rng(0).standard_normal((len(inner), 3))
+    first = restrict(squeezed(points, tets, 0.20), inner)
+    second = restrict(squeezed(points, tets, 0.21), inner)
+    solver = _core.SpdSolver(first, "multigrid")
+    _, fresh = solver.solve(rhs, np.zeros_like(rhs), 1e-9)
+    solver.refactor(second.data, keep_preconditioner=True)
+    x, kept = solver.solve(rhs, np.zeros_like(rhs), 1e-9)
+    assert relative_residual(second, x, rhs).max() <= 1e-9
+    assert fresh.iterations <= kept.iterations <= 2 * fresh.iterations
+
+
 def test_numbering_of_the_unknowns_does_not_matter(solid):
     points, tets, inner = solid
     matrix = restrict(squeezed(points, tets, 0.3), inner)
