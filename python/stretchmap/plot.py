@@ -164,6 +164,7 @@ def convergence(result: MapResult) -> Figure:
     bottom.set_ylim(bottom=0.0, top=max(1.0, 2.0 * flips.max(initial=0.0)))
     bottom.set_ylabel("flipped elements")
     bottom.set_xlabel("iteration, all stages counted on")
+    bottom.xaxis.get_major_locator().set_params(integer=True)
     for axes in (top, middle):
         if axes.get_legend_handles_labels()[0]:
             axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -126,14 +126,20 @@ def check_output(path: Path, allowed: tuple[str, ...], *others: Path | None) -> 
         raise FileNotFoundError(errno.ENOENT, "no such folder", str(folder))
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
-    if not os.access(folder, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
+    if not _writable(folder) or (path.exists() and not _writable(path)):
         raise PermissionError(errno.EACCES, "cannot be written", str(path))
     for other in others:
         if other is not None and path.resolve() == other.resolve():
             raise OptionError(f"{path} would be replaced by the output; choose another name")
 
 
-def check_outputs(output: Path, allowed: tuple[str, ...], json_path: Path | None, *inputs: Path):
+def _writable(path: Path) -> bool:
+    return os.access(path, os.W_OK)
+
+
+def check_outputs(
+    output: Path, allowed: tuple[str, ...], json_path: Path | None, *inputs: Path
+) -> None:
     """:func:`check_output` for an output and the JSON report beside it."""
     check_output(output, allowed, *inputs)
     if json_path is not None:

@@ -37,6 +37,8 @@ def guarded(run: Callable[[], object]) -> int:
     try:
         with _warnings_on_stderr(), _quick_interrupt():
             code = run()
+        if code == INTERRUPTED:  # typer has seen it first
+            raise KeyboardInterrupt
         return code if isinstance(code, int) else SUCCESS
     except (KeyboardInterrupt, Cancelled):
         return _say("interrupted", INTERRUPTED)

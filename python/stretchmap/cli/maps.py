@@ -43,6 +43,14 @@ class Solver(str, Enum):
     jacobi = "jacobi"
 
 
+class Finish(str, Enum):
+    """Values of ``--finish``."""
+
+    ring = "ring"
+    face = "face"
+    none = "none"
+
+
 Ratio = Annotated[
     str | None,
     typer.Option(help="R / r of the torus: conformal, search or a number.", show_default=False),
@@ -51,6 +59,7 @@ Phase = Annotated[
     float | None,
     typer.Option(help="Turns around the tube; searched if left out.", show_default=False),
 ]
+MaxIter = Annotated[int | None, typer.Option(help="Most steps.", show_default=False)]
 
 
 def register(app: typer.Typer) -> None:
@@ -76,12 +85,20 @@ def conformal(
     watch.lap("read")
     result = conformal_map(surface)
     watch.lap("compute")
-    finish(result, output, json, quiet, watch)
+    conclude(result, output, json, quiet, watch)
 
 
 def area(
     input: Input,
     output: Output,
+    finish: Annotated[
+        Finish | None,
+        typer.Option(help="Finish on the faces' areas, then on the vertex rings' (default)."),
+    ] = None,
+    max_iter: MaxIter = None,
+    tol: Annotated[
+        float | None, typer.Option(help="Goal for the SD of the face ratios.", show_default=False)
+    ] = None,
     ratio: Ratio = None,
     phase: Phase = None,
     json: Json = None,
@@ -95,14 +112,20 @@ def area(
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
-    options = {"ratio": parsed_ratio(ratio), "phase": phase}
+    options: dict[str, Any] = {
+        "finish": None if finish is None else finish.value,
+        "max_iter": max_iter,
+        "tol": tol,
+        "ratio": parsed_ratio(ratio),
+        "phase": phase,
+    }
     options = {name: value for name, value in options.items() if value is not None}
     surface = common.surface_of(common.read_mesh(input, orient, compact))
     watch.lap("read")
     with terminal(quiet) as bar:
         result = area_map(surface, **options, progress=bar)
     watch.lap("compute")
-    finish(result, output, json, quiet, watch)
+    conclude(result, output, json, quiet, watch)
 
 
 def volume(
@@ -118,7 +141,7 @@ def volume(
     c: Annotated[
         float | None, typer.Option("--c", help="Regularisation (5.6) of vsem, dimensionless.")
     ] = None,
-    max_iter: Annotated[int | None, typer.Option(help="Most steps.", show_default=False)] = None,
+    max_iter: MaxIter = None,
     tol: Annotated[
         float | None,
         typer.Option(help="Stop when a step lowers the energy by no more than this share."),
@@ -128,11 +151,17 @@ def volume(
     start: Annotated[
         Path | None, typer.Option(help="Go on from this map file of the same solid.")
     ] = None,
+    vertex_exact: Annotated[
+        bool, typer.Option("--vertex-exact", help="In the end make interior ring volumes exact.")
+    ] = False,
     refine: Annotated[
         bool, typer.Option(help="Split interior edges and faces the boundary alone decides about.")
     ] = True,
     keep_best: Annotated[
-        bool, typer.Option(help="Write the best map even if it is not certified; exit code 1.")
+        bool,
+        typer.Option(
+            "--keep-best", help="Write the best map even if it is not certified; exit code 1."
+        ),
     ] = False,
     solver: Annotated[Solver, typer.Option(help="Linear solver.")] = Solver.auto,
     json: Json = None,
@@ -159,11 +188,11 @@ def volume(
     watch.lap("read")
     with terminal(quiet) as bar:
         result = volume_map(
-            solid, c=c, max_iter=max_iter, tol=tol, phase=phase, refine=refine,
-            keep_best=keep_best, progress=bar, **options,
+            solid, c=c, max_iter=max_iter, tol=tol, phase=phase,
+            vertex_exact=vertex_exact, refine=refine, keep_best=keep_best, progress=bar, **options,
         )  # fmt: skip
     watch.lap("compute")
-    finish(result, output, json, quiet, watch)
+    conclude(result, output, json, quiet, watch)
     if result.method == "certified" and not result.certificate.certified:
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
         return 1
@@ -229,7 +258,7 @@ def resumed(solid: TetMesh, loaded: LoadedMap, path: Path) -> tuple[TetMesh, Any
     return loaded.solid, loaded.image, loaded.torus
 
 
-def finish(
+def conclude(
     result: MapResult, output: Path, json_path: Path | None, quiet: bool, watch: common.Stopwatch
 ) -> None:
     """Certify if that has not been done, write output and report, print the table."""

@@ -76,7 +76,7 @@ def demo(
     from .. import plot, samples
     from ..progress import terminal
     from ..volume import volume_map
-    from .maps import finish
+    from .maps import conclude
 
     common.require_package("matplotlib", "the demo's pictures", "plot")
     if output.exists() and not output.is_dir():
@@ -99,7 +99,7 @@ def demo(
     watch.lap("pictures")
     output.mkdir(parents=True, exist_ok=True)
     common.check_output(output / "map.npz", (".npz",))
-    finish(result, output / "map.npz", json, quiet, watch)
+    conclude(result, output / "map.npz", json, quiet, watch)
     for figure, name in ((histogram, "ratios.png"), (torus, "torus.png")):
         plot.save(figure, output / name)
         if not quiet:

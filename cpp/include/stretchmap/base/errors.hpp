@@ -14,8 +14,8 @@ class Error : public std::runtime_error {
  public:
   Error(std::string kind_, const std::string& message, std::vector<Index> ids_ = {})
       : std::runtime_error(message), kind(std::move(kind_)), ids(std::move(ids_)) {}
-  std::string kind;         // "NonManifoldError", "SolverError", ...
-  std::vector<Index> ids;   // offending vertices, faces or tets
+  std::string kind;        // "NonManifoldError", "SolverError", ...
+  std::vector<Index> ids;  // offending vertices, faces or tets
 };
 
 }  // namespace stretchmap
