@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "stretchmap/stretch/element_energy.hpp"
+#include "stretchmap/stretch/triangle_energy.hpp"
 
 namespace stretchmap {
 namespace {
@@ -39,7 +39,7 @@ double match_value(const SurfaceChart& chart, const Points2Ref& y, const PointsR
   for (Index f = 0; f < chart.faces.rows(); ++f) {
     if (!(chart_edges(chart, y, f).determinant() > 0.0))
       return std::numeric_limits<double>::infinity();
-    total += weights[f] * face_energy(plane_edges(chart, X, f) * rest_of(rest, f));
+    total += weights[f] * triangle_energy(plane_edges(chart, X, f) * rest_of(rest, f));
   }
   return total;
 }
@@ -55,7 +55,7 @@ MatchModel match_model(const SurfaceChart& chart, const Points2Ref& y, const Poi
     const Eigen::Matrix2d S = P * chart_edges(chart, y, f).inverse();
     Eigen::Matrix2d slope;
     Matrix4 curvature;
-    face_energy(P * R, slope, curvature);
+    triangle_energy(P * R, slope, curvature);
     // vec(K) = D vec(y), y the six chart coordinates of the corners.
     Eigen::Matrix<double, 3, 2> G;
     G << 0.0, 0.0, R(0, 0), R(0, 1), R(1, 0), R(1, 1);

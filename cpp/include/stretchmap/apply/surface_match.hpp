@@ -3,7 +3,7 @@
 //
 //   Psi(y) = sum_f weight_f phi(K_f),  K_f = P_f(X(y)) rest_f,
 //
-// phi the face_energy of element_energy.hpp, P_f the edges of the image triangle in its own plane.
+// phi that of triangle_energy.hpp, P_f the edges of the image triangle in its own plane.
 // Derivatives hold the metric S_f = P_f E_f^-1 fixed, E_f being the edges in the chart.
 #pragma once
 
