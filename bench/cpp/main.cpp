@@ -34,7 +34,7 @@ constexpr const char* kUsage =
     "usage: stretchmap_bench [--sizes N,N,...] [--threads N,N,...] [--only GROUP,...]\n"
     "                        [--vsem-steps N] [--newton-steps N] [--c C] [--json FILE]\n"
     "                        [--context KEY=VALUE]...\n"
-    "Groups: mesh, surface, volume, newton. Sizes are tets of a generated solid torus.\n";
+    "Groups: mesh, surface, linalg, volume, newton. Sizes are tets of a generated solid torus.\n";
 
 struct Arguments {
   std::vector<long> sizes{10000, 100000};
@@ -143,6 +143,7 @@ void run(Arguments& a) {
       report(generated);
       if (wanted(a.settings, "mesh") || wanted(a.settings, "surface"))
         surface_stages(solid, a.settings, report);
+      if (wanted(a.settings, "linalg")) linalg_stages(solid, a.settings, report);
       volume_stages(solid, a.settings, report);
     }
   }
