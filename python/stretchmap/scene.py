@@ -65,7 +65,8 @@ def cut(
     half = grid.clip("y", origin=(0.0, 0.0, 0.0), invert=False)
     table, limits = _COLOURS[colour]
     plotter = pv.Plotter(off_screen=off_screen)
-    title = f"source {'xyz'[along]}" if colour == "coordinate" else "volume ratio"
+    # The line break keeps the title off the numbers below it.
+    title = (f"source {'xyz'[along]}" if colour == "coordinate" else "volume ratio") + "\n"
     plotter.add_mesh(
         half, scalars=colour, cmap=table, clim=limits, scalar_bar_args={"title": title}
     )
@@ -152,6 +153,7 @@ def _look(plotter: Any) -> None:
     plotter.camera.elevation = 35.0
     plotter.camera.azimuth = -20.0
     plotter.reset_camera()
+    plotter.camera.zoom(1.3)
 
 
 def _pyvista() -> Any:

@@ -414,3 +414,13 @@ def test_a_long_call_that_never_returns_to_python_is_ended_too():
     assert run.returncode == 130
     assert time.perf_counter() - started < 15.0
     assert run.stderr == "stretchmap: interrupted\n"
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    script = (
+        "import sys, stretchmap, stretchmap.cli\n"
+        "heavy = {'scipy', 'matplotlib', 'pyvista', 'meshio', 'typer', 'rich'}\n"
+        "sys.exit(', '.join(heavy & sys.modules.keys()) or 0)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENV)
+    assert run.returncode == 0, run.stderr
