@@ -13,6 +13,8 @@
 
 namespace stretchmap::linalg {
 
+inline constexpr std::size_t kPadding = 3;  // numbers the sweeps may read beyond the last block
+
 template <int B>
 struct LevelMatrix {
   Index n = 0;      // block rows
