@@ -34,13 +34,14 @@ void bind_apply(py::module_& m) {
         release_gil());
   m.def(
       "match_model",
-      [](const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X, const RowsRef& rest,
-         const VecRef& weights) {
-        MatchModel model = match_model(chart, y, X, rest, weights);
+      [](const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X, const RowsRef& slopes,
+         const RowsRef& rest, const VecRef& weights) {
+        MatchModel model = match_model(chart, y, X, slopes, rest, weights);
         return std::make_pair(std::move(model.gradient), std::move(model.hessian));
       },
       py::arg("chart"), py::arg("y").noconvert(), py::arg("X").noconvert(),
-      py::arg("rest").noconvert(), py::arg("weights").noconvert(), release_gil());
+      py::arg("slopes").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
+      release_gil());
 
   py::class_<TetSplit>(m, "TetSplit")
       .def_readonly("tets", &TetSplit::tets)

@@ -50,6 +50,7 @@ _EXPORTS = {
     "inverse": "coordinates",
     "torus_coordinates": "coordinates",
     "partition": "partitions",
+    "register": "registration",
 }
 _MODULES = {"errors", "samples", "plot"}
 

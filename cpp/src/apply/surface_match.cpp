@@ -45,32 +45,43 @@ double match_value(const SurfaceChart& chart, const Points2Ref& y, const PointsR
 }
 
 MatchModel match_model(const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
-                       const RowsRef& rest, const VecRef& weights) {
-  const Index n = static_cast<Index>(y.rows()), m = static_cast<Index>(chart.faces.rows());
+                       const RowsRef& slopes, const RowsRef& rest, const VecRef& weights) {
+  const Index n = static_cast<Index>(X.rows()), m = static_cast<Index>(chart.faces.rows());
   MatchModel model{Vec::Zero(2 * n), SparseMatrix(2 * n, 2 * n)};
   std::vector<Eigen::Triplet<double, Index>> entries;
   entries.reserve(36 * static_cast<std::size_t>(m));
   for (Index f = 0; f < m; ++f) {
+    const Eigen::Vector3d a = (X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0))).transpose();
+    const Eigen::Vector3d b = (X.row(chart.faces(f, 2)) - X.row(chart.faces(f, 0))).transpose();
+    Eigen::Matrix<double, 3, 2> frame;
+    frame.col(0) = a.normalized();
+    frame.col(1) = (b - b.dot(frame.col(0)) * frame.col(0)).normalized();
     const Eigen::Matrix2d P = plane_edges(chart, X, f), R = rest_of(rest, f);
-    const Eigen::Matrix2d S = P * chart_edges(chart, y, f).inverse();
-    Eigen::Matrix2d slope;
+    Eigen::Matrix2d stress;
     Matrix4 curvature;
-    triangle_energy(P * R, slope, curvature);
-    // vec(K) = D vec(y), y the six chart coordinates of the corners.
+    triangle_energy(P * R, stress, curvature);
     Eigen::Matrix<double, 3, 2> G;
     G << 0.0, 0.0, R(0, 0), R(0, 1), R(1, 0), R(1, 1);
     G.row(0) = -(G.row(1) + G.row(2));
-    Eigen::Matrix<double, 4, 6> D;
-    for (int a = 0; a < 3; ++a)
-      for (int k = 0; k < 2; ++k) D.block<2, 2>(2 * k, 2 * a) = S * G(a, k);
-    const Eigen::Map<const Eigen::Vector4d> flat(slope.data());
+    Eigen::Matrix<double, 4, 6> D;  // of vec(K) by the chart coordinates of the corners
+    Eigen::Matrix2d S = P * chart_edges(chart, y, f).inverse();
+    for (int c = 0; c < 3; ++c) {
+      if (slopes.rows() > 0) {
+        const auto row = slopes.row(chart.faces(f, c));
+        Eigen::Matrix<double, 3, 2> J;
+        J << row[0], row[1], row[2], row[3], row[4], row[5];
+        S = frame.transpose() * J;
+      }
+      for (int k = 0; k < 2; ++k) D.block<2, 2>(2 * k, 2 * c) = S * G(c, k);
+    }
+    const Eigen::Map<const Eigen::Vector4d> flat(stress.data());
     const Eigen::Matrix<double, 6, 1> g = weights[f] * (D.transpose() * flat);
     const Eigen::Matrix<double, 6, 6> H = weights[f] * (D.transpose() * curvature * D);
-    for (int a = 0; a < 6; ++a) {
-      const Index row = 2 * chart.faces(f, a / 2) + a % 2;
-      model.gradient[row] += g[a];
-      for (int b = 0; b < 6; ++b)
-        entries.emplace_back(row, 2 * chart.faces(f, b / 2) + b % 2, H(a, b));
+    for (int p = 0; p < 6; ++p) {
+      const Index row = 2 * chart.faces(f, p / 2) + p % 2;
+      model.gradient[row] += g[p];
+      for (int q = 0; q < 6; ++q)
+        entries.emplace_back(row, 2 * chart.faces(f, q / 2) + q % 2, H(p, q));
     }
   }
   model.hessian.setFromTriplets(entries.begin(), entries.end());

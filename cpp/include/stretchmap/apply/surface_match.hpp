@@ -4,7 +4,6 @@
 //   Psi(y) = sum_f weight_f phi(K_f),  K_f = P_f(X(y)) rest_f,
 //
 // phi that of triangle_energy.hpp, P_f the edges of the image triangle in its own plane.
-// Derivatives hold the metric S_f = P_f E_f^-1 fixed, E_f being the edges in the chart.
 #pragma once
 
 #include "stretchmap/base/types.hpp"
@@ -22,8 +21,15 @@ struct MatchModel {
   SparseMatrix hessian;  // (2 n, 2 n), positive semi-definite
 };
 
+// Derivatives by y. What a step dy does to the edges of an image triangle is modelled in one of two
+// ways:
+//   tangent  dX = slope dy at each corner; slopes (n, 6) are row-major 3x2 matrices;
+//   chord    dP_f = S_f dE_f with the metric S_f = P_f E_f^-1 of the whole triangle, E_f its edges
+//   in
+//            the chart; slopes (0, 6). Coarser, but it sees farther than one face of the target.
+// How the metric changes along the step is left out of the Hessian.
 // \pre match_value is finite.
 MatchModel match_model(const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
-                       const RowsRef& rest, const VecRef& weights);
+                       const RowsRef& slopes, const RowsRef& rest, const VecRef& weights);
 
 }  // namespace stretchmap

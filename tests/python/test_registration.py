@@ -1,0 +1,228 @@
+"""Registration: exact cases, the synthetic pair with its known correspondence, contradictions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import stretchmap as sm
+from stretchmap import _core, samples
+from stretchmap._flat import FlatSurface, Gauge, choose_gauge
+from stretchmap._match import affine_landmark_map
+from stretchmap.coordinates import PointMap
+from stretchmap.errors import (
+    ArrayError,
+    FileFormatError,
+    LandmarkError,
+    OptionError,
+)
+from stretchmap.mesh import TetMesh
+from stretchmap.registration import Landmarks, landmarks_between, read_landmarks, register
+
+RNG = np.random.default_rng(8)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return samples.vertebra_pair(n_landmarks=30, n_tets=(9000, 12_000))
+
+
+@pytest.fixture(scope="module")
+def registered(pair):
+    return register(pair.source, pair.target, (pair.source_landmarks, pair.target_landmarks))
+
+
+def size(mesh):
+    return np.linalg.norm(np.ptp(mesh.V, axis=0))
+
+
+def surface_distance(points, surface):
+    """Distance of points from a surface, brute force over the faces near them."""
+    igl = pytest.importorskip("igl")
+    return np.sqrt(igl.point_mesh_squared_distance(points, surface.V, surface.F)[0])
+
+
+def test_a_solid_registered_with_itself_stays_where_it_is():
+    solid = samples.vertebra_like(6000)
+    result = register(solid, solid)
+    assert result.certificate.certified
+    assert np.abs(result.image - solid.V).max() < 1e-3 * size(solid)
+    assert result.distortion.total_distortion < 1e-4
+
+
+def test_a_moved_copy_is_found_without_landmarks():
+    solid = samples.vertebra_like(6000, seed=3)
+    Q = np.linalg.qr(RNG.standard_normal((3, 3)))[0]
+    Q *= np.sign(np.linalg.det(Q))
+    order = RNG.permutation(solid.n_vertices)
+    rank = np.argsort(order).astype(np.int32)
+    copy = TetMesh(2.5 * solid.V[order] @ Q.T + [7.0, -3.0, 1.0], rank[solid.T])
+    result = register(solid, copy)
+    assert np.abs(result.image - copy.V[rank]).max() < 1e-3 * size(copy)
+    assert result.gauge.rule == "rigid fit" and result.gauge.residual < 1e-2
+
+
+def test_the_synthetic_pair_against_the_truth(pair, registered):
+    result = registered
+    assert result.certificate.certified and result.distortion.flips == 0
+    assert result.landmark_error < 1e-12
+    assert np.array_equal(result.image[pair.source_landmarks], pair.target.V[pair.target_landmarks])
+    error = np.linalg.norm(result.image[: pair.source.n_vertices] - pair.truth, axis=1)
+    assert error.mean() < 0.02 * size(pair.target)
+    free = register(pair.source, pair.target)
+    before = np.linalg.norm(free.image[: pair.source.n_vertices] - pair.truth, axis=1)
+    assert error.mean() < before.mean()
+    assert result.distortion.ring_sd < 0.12 and result.distortion.total_distortion < 0.07
+
+
+def test_the_boundary_goes_to_the_boundary(pair, registered):
+    ids = pair.source.boundary_vertices
+    distance = surface_distance(registered.image[ids], pair.target.surface)
+    assert distance.max() < 1e-9 * size(pair.target)
+    assert registered.image[:, 2].max() <= pair.target.V[:, 2].max() + 1e-9
+
+
+def test_there_and_back(registered):
+    both = PointMap(registered)
+    points = registered.solid.V[registered.solid.T].mean(axis=1)
+    there = both.forward(points)
+    assert there.inside.all()
+    assert np.abs(both.inverse(there.points).points - points).max() < 1e-9 * size(registered.solid)
+
+
+def test_landmarks_as_points_and_files(pair, tmp_path):
+    ids = pair.source_landmarks, pair.target_landmarks
+    points = [m.V[i] for m, i in zip((pair.source, pair.target), ids, strict=True)]
+    shift = 1e-4 * size(pair.source) * np.array([1.0, 0.0, 0.0])
+    given = Landmarks.of(pair.source, pair.target, points[0] + shift, points[1])
+    assert np.array_equal(given.source, ids[0]) and np.array_equal(given.target, ids[1])
+    assert np.allclose(given.snapped[:, 0], np.linalg.norm(shift)) and not given.snapped[:, 1].any()
+    by_id, by_point = tmp_path / "ids.csv", tmp_path / "points.csv"
+    by_id.write_text("source,target\n" + "\n".join(f"{a},{b}" for a, b in zip(*ids, strict=True)))
+    np.savetxt(by_point, np.hstack(points), delimiter=",", fmt="%.17g")
+    for path in (by_id, by_point):
+        read = read_landmarks(path, pair.source, pair.target)
+        assert np.array_equal(read.source, ids[0]) and np.array_equal(read.target, ids[1])
+
+
+@pytest.mark.parametrize("text", ["", "a,b\n", "1,2,3\n", "1,2\n1,x\n", "1.5,2\n"])
+def test_bad_landmark_files_are_named(pair, tmp_path, text):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(FileFormatError):
+        read_landmarks(path, pair.source, pair.target)
+
+
+def test_bad_landmarks_are_named(pair):
+    source, target = pair.source, pair.target
+    boundary = source.boundary_vertices
+    inner = np.setdiff1d(np.arange(source.n_vertices), boundary)[:1]
+    with pytest.raises(LandmarkError, match="not on the boundary"):
+        Landmarks.of(source, target, inner, target.boundary_vertices[:1])
+    with pytest.raises(LandmarkError, match="no vertex") as caught:
+        Landmarks.of(source, target, [boundary[0], 10**6], target.boundary_vertices[:2])
+    assert caught.value.ids == (1,)
+    with pytest.raises(LandmarkError, match="same source vertex") as caught:
+        Landmarks.of(source, target, boundary[[5, 3, 5]], target.boundary_vertices[:3])
+    assert caught.value.ids == (0, 2)
+    with pytest.raises(ArrayError):
+        Landmarks.of(source, target, boundary[:3], target.boundary_vertices[:2])
+    with pytest.raises(ArrayError):
+        Landmarks.of(source, target, np.zeros((3, 2)), boundary[:3])
+    for options in ({"h": "wild"}, {"max_iter": -1}, {"tol": -1.0}):
+        with pytest.raises(OptionError):
+            register(source, target, **options)
+
+
+def test_the_gauge_is_recovered(pair):
+    flat = FlatSurface.of(pair.source.surface)
+    for sign, twist, shift in [(1, 0, (0.3, 0.6)), (-1, 1, (0.0, 0.25)), (-1, -1, (0.7, 0.1))]:
+        moved = flat.changed(Gauge(sign, twist, shift, 0.0, ""))
+        ids = np.arange(0, pair.source.surface.n_vertices, 29, dtype=np.int32)
+        for marks in (None, np.stack([ids, ids], axis=1)):
+            found = choose_gauge(flat, moved, marks)
+            assert (found.sign, found.twist) == (sign, twist)
+            off = np.array(found.shift) - shift
+            assert np.abs(off - np.round(off)).max() < 2e-3
+            assert found.residual < 1e-2
+
+
+def test_affine_map_takes_landmarks_to_landmarks_and_is_periodic():
+    grid = np.stack(np.meshgrid(np.arange(5), np.arange(5)), axis=-1).reshape(-1, 2)
+    source = (grid + 0.3 * RNG.random((25, 2))) / 5
+    target = source + 0.01 * RNG.standard_normal((25, 2))
+    assert np.allclose(affine_landmark_map(source, target, source), target, atol=1e-12)
+    y = RNG.random((400, 2))
+    mapped = affine_landmark_map(source, target, y)
+    whole = RNG.integers(-2, 3, (400, 2))
+    assert np.allclose(affine_landmark_map(source, target, y + whole), mapped + whole, atol=1e-9)
+    # The same motion of all landmarks, taken the short way round, is a shift.
+    assert np.allclose(
+        affine_landmark_map(source, source + np.array([0.9, 0.3]), y), y + np.array([-0.1, 0.3])
+    )
+
+
+def test_affine_registration_of_the_pair(pair):
+    result = register(
+        pair.source, pair.target, (pair.source_landmarks, pair.target_landmarks), h="affine",
+        keep_best=True,
+    )  # fmt: skip
+    assert result.h == "affine" and result.landmark_error < 1e-12
+
+
+def test_contradicting_landmarks_name_the_pair(pair):
+    """Two neighbouring landmarks exchanged: no map without a fold takes both."""
+    a, b = pair.source_landmarks.copy(), pair.target_landmarks
+    near = cKDTree(pair.source.V[a]).query(pair.source.V[a], k=2)
+    first = int(np.argmin(near[0][:, 1]))
+    second = int(near[1][first, 1])
+    a[[first, second]] = a[[second, first]]
+    with pytest.raises(LandmarkError) as caught:
+        register(pair.source, pair.target, (a, b), h="affine")
+    assert set(caught.value.ids) == {first, second}
+
+
+def test_surface_derivatives_match_finite_differences():
+    """On a flat patch of the target the energy's gradient is exact in both models."""
+    surface = samples.torus_surface(24, 12)
+    flat = FlatSurface.of(surface)
+    rest = _core.rest_triangles(surface.V, surface.F, 1.0)
+    weights = surface.face_areas / surface.area
+    # Points in general position inside faces; the edges of the chart's faces are smooth there.
+    y = flat.turns + np.array([0.013, 0.017])
+    X = flat.points(y)
+    faces, _ = flat.locate(y)
+    F, V = surface.F[faces], surface.V
+    shift = np.stack([flat.chart.shift_u, flat.chart.shift_v], axis=-1)[faces]
+    corner = flat.turns[F] + shift
+    edges = np.stack([V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]], axis=-1)
+    chart_edges = np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=-1)
+    slopes = np.ascontiguousarray((edges @ np.linalg.inv(chart_edges)).reshape(-1, 6))
+    gradient, hessian = _core.match_model(flat.chart, y, X, slopes, rest, weights)
+    assert np.abs(hessian - hessian.T).max() < 1e-12 * np.abs(hessian).max()
+    direction = RNG.standard_normal(y.shape)
+    step = 1e-7
+
+    def energy(z):
+        return _core.match_value(flat.chart, z, flat.points(z), rest, weights)
+
+    difference = (energy(y + step * direction) - energy(y - step * direction)) / (2 * step)
+    assert difference == pytest.approx(gradient @ direction.ravel(), rel=1e-5)
+
+
+def test_landmarks_by_rule(pair):
+    free = register(pair.source, pair.target)
+    marks = landmarks_between(free, 32)
+    assert len(marks) == 32 and len(set(marks.source)) == len(set(marks.target)) == 32
+    with pytest.raises(LandmarkError):
+        landmarks_between(free, 10**5)
+
+
+def test_saving(registered, tmp_path):
+    registered.save(tmp_path / "r.npz")
+    loaded = sm.load_map(tmp_path / "r.npz")
+    assert np.array_equal(loaded.image, registered.image)
+    assert np.array_equal(loaded.arrays["target_T"], registered.target.T)
+    assert loaded.meta["landmarks"] == 30 and loaded.meta["certified"]
+    assert "landmark error" in registered.summary()
