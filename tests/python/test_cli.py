@@ -67,6 +67,9 @@ def test_map_commands_write_the_map_and_the_report(folder, capsys, solid, comman
     assert REPORT_KEYS <= report.keys()
     assert {"R", "r"} == report["torus"].keys()
     assert {"stretchmap", "python", "numpy", "scipy"} <= report["versions"].keys()
+    total = report["seconds"].pop("total")
+    assert {"read"} < report["seconds"].keys()
+    assert 0.0 < sum(report["seconds"].values()) <= total
     assert "written to map.npz" in out and "ring sd" in out
     assert report["flips"] == 0 and report["certified"] is True
 

@@ -42,14 +42,18 @@ class Stopwatch:
     """Seconds by stage, in the order of the laps."""
 
     def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._start = time.perf_counter()
+        self._seconds: dict[str, float] = {}
+        self._start = self._lap = time.perf_counter()
 
-    def lap(self, stage: str) -> None:
-        """Book the time since the last lap on a stage."""
+    def lap(self, *stages: str, **measured: float) -> None:
+        """Book the time since the last lap on a stage, or what was measured of it elsewhere."""
         now = time.perf_counter()
-        self.seconds[stage] = now - self._start
-        self._start = now
+        self._seconds |= dict.fromkeys(stages, now - self._lap) | measured
+        self._lap = now
+
+    def seconds(self) -> dict[str, float]:
+        """Seconds of every stage, and the total."""
+        return {**self._seconds, "total": time.perf_counter() - self._start}
 
 
 def read_mesh(path: Path, orient: bool = False, compact: bool = False) -> TriMesh | TetMesh:

@@ -84,7 +84,7 @@ def conformal(
     surface = common.surface_of(common.read_mesh(input, orient, compact))
     watch.lap("read")
     result = conformal_map(surface)
-    watch.lap("compute")
+    watch.lap(**result.seconds)
     conclude(result, output, json, quiet, watch)
 
 
@@ -124,7 +124,7 @@ def area(
     watch.lap("read")
     with terminal(quiet) as bar:
         result = area_map(surface, **options, progress=bar)
-    watch.lap("compute")
+    watch.lap(**result.seconds)
     conclude(result, output, json, quiet, watch)
 
 
@@ -191,7 +191,7 @@ def volume(
             solid, c=c, max_iter=max_iter, tol=tol, phase=phase,
             vertex_exact=vertex_exact, refine=refine, keep_best=keep_best, progress=bar, **options,
         )  # fmt: skip
-    watch.lap("compute")
+    watch.lap(**result.seconds)
     conclude(result, output, json, quiet, watch)
     if result.method == "certified" and not result.certificate.certified:
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
@@ -272,7 +272,7 @@ def conclude(
     report["certified"] = certificate.certified
     report["reason"] = certificate.reason
     report["certificate"] = certificate.to_dict()
-    report["seconds"] = {**watch.seconds, **report["seconds"]}
+    report["seconds"] = watch.seconds()
     common.write_together(output, result.save, json_path, report)
     if not quiet:
         nested = ("seconds", "torus", "versions", "certificate", "history")

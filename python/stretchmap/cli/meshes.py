@@ -94,7 +94,7 @@ def homology(
     watch.lap("homology")
     if not quiet:
         typer.echo(basis.summary())
-    report |= {"seconds": watch.seconds, "versions": versions()}
+    report |= {"seconds": watch.seconds(), "versions": versions()}
     if output is None:
         common.write_json(json, report)
     else:

@@ -94,7 +94,7 @@ def demo(
     watch.lap("sample")
     with terminal(quiet) as bar:
         result = volume_map(solid, progress=bar)
-    watch.lap("compute")
+    watch.lap(**result.seconds)
     histogram, torus = plot.ratios(result), plot.cutaway(result)
     watch.lap("pictures")
     output.mkdir(parents=True, exist_ok=True)
