@@ -94,10 +94,10 @@ SurfaceWeights weights_of(double area, double shape, double chart) { return {are
 
 void bind_glide(py::module_& m) {
   py::class_<GlideProblem>(m, "GlideProblem")
-      .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio) {
-             return GlideProblem{chart, reference, ratio};
-           }),
-           py::arg("chart"), py::arg("reference"), py::arg("ratio"), release_gil());
+      .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio,
+                       bool facing) { return GlideProblem{chart, reference, ratio, facing}; }),
+           py::arg("chart"), py::arg("reference"), py::arg("ratio"), py::arg("facing") = false,
+           release_gil());
   m.def(
       "glide_energy",
       [](const GlideProblem& problem, double area, double shape, double chart, double scale,

@@ -50,8 +50,9 @@ class FlipFreeOptions:
     floor : float
         Least determinant untangling aims for: a start closer to folding than that makes the barrier
         too steep for rounded arithmetic.
-    tol : float
-        At the largest lambda: stop when a step lowers the energy by no more than this share.
+    glide_tol, frozen_tol : float
+        At the largest lambda: stop when a step lowers the energy by no more than this share. With
+        the boundary held the decrease is slower from the beginning.
     exact_sd_factor : float
         `FlipFreeSolver.make_rings_exact` may raise the SD of the tet ratios by this factor.
     cg_tol, max_cg
@@ -64,10 +65,11 @@ class FlipFreeOptions:
     face_weight: float = 1.0
     max_aspect: float = 6.0
     untangle_iter: int = 200
-    frozen_iter: int = 60
+    frozen_iter: int = 150
     glide_iter: int = 60
     floor: float = 1e-3
-    tol: float = 2e-3
+    glide_tol: float = 2e-3
+    frozen_tol: float = 5e-4
     exact_sd_factor: float = 1.25
     cg_tol: float = 0.1
     max_cg: int = 200
@@ -225,7 +227,7 @@ class FlipFreeSolver:
                     weight = min(goal, o.growth * weight)
                 elif step.alpha == 0.0:
                     return x, False, f"no step lowers the energy at lambda = {weight:g}"
-            elif before - after <= o.tol * before:
+            elif before - after <= (o.glide_tol if glide else o.frozen_tol) * before:
                 return x, True, "the energy stopped decreasing"
         if weight < goal:
             return x, False, "most iterations done"

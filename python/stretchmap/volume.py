@@ -143,7 +143,7 @@ def volume_map(
         Most steps of ``"vsem"`` (default 20) or of the last stage of ``"certified"``.
     tol : float, optional
         Stop when a step lowers the energy by no more than this share (default 1e-6 for ``"vsem"``,
-        2e-3 for ``"certified"``).
+        2e-3 or, with a frozen boundary, 5e-4 for ``"certified"``).
     ratio : "conformal", "search" or float, optional
         R / r of the torus, as in `area_map`. Default: the conformal one for ``"vsem"``, a search
         for ``"certified"``.
@@ -322,7 +322,7 @@ def _with_overrides(
 ) -> FlipFreeOptions:
     if max_iter is not None:
         options = dataclasses.replace(options, frozen_iter=max_iter, glide_iter=max_iter)
-    return options if tol is None else dataclasses.replace(options, tol=tol)
+    return options if tol is None else dataclasses.replace(options, glide_tol=tol, frozen_tol=tol)
 
 
 def _refuse_joins(solid: TetMesh) -> None:

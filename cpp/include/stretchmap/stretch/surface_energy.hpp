@@ -7,8 +7,11 @@
 //                                                         times the torus' density at its middle,
 //                                                         over |t|
 //
-// The last term is infinite before any face can turn over in the chart. Areas of source and torus
-// are scaled to one.
+// The last term is infinite before any face can turn over in the chart. With `facing` it is joined
+// by the mean over the corners of sigma_k + 1/sigma_k - 2, sigma_k = component of g(t)'s area
+// vector along the torus' normal at corner k over |t|: infinite before the flat face turns inward
+// at a corner, which a coarse face can do while its chart area is positive. Areas of source and
+// torus are scaled to one.
 #pragma once
 
 #include "stretchmap/base/types.hpp"
@@ -26,7 +29,8 @@ struct SurfaceWeights {
 struct GlideProblem {
   SurfaceChart chart;
   SurfaceReference reference;
-  double ratio = 2.0;  // R / r
+  double ratio = 2.0;   // R / r
+  bool facing = false;  // whether faces are kept from turning inward at their corners
 };
 
 struct GlideEnergy {
@@ -47,6 +51,9 @@ double best_scale(const GlideProblem& problem, const Points2Ref& angles);
 
 // (n, 3) points of the torus of area one.
 Points glide_image(const GlideProblem& problem, const Points2Ref& angles);
+
+// Whether every flat image face looks outward at all its corners.
+bool all_facing(const GlideProblem& problem, const Points2Ref& angles);
 
 // (m) areas of the polyhedral image; the torus itself has area one.
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles);

@@ -21,7 +21,8 @@ struct GlideStep {
 
 class SurfaceNewton {
  public:
-  // areas of `problem` as surface_reference gives them; angles (n, 2) without flipped faces.
+  // areas of `problem` as surface_reference gives them; angles (n, 2) without flipped faces. Faces
+  // are kept facing outward if all of them do at the start.
   // \throws Error "SolverError" if a face is flipped in the chart (ids: faces).
   SurfaceNewton(GlideProblem problem, Points2 angles);
 
