@@ -182,6 +182,23 @@ def test_finishing_derivatives_by_differences(
     )
 
 
+def test_facing_gradient_by_differences(bumpy: TriMesh, chart: _core.SurfaceChart) -> None:
+    result = area_map(bumpy, finish="none", sem_iter=2)
+    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
+    problem = _core.GlideProblem(chart, reference, result.ratio, facing=True)
+    plain = _core.GlideProblem(chart, reference, result.ratio)
+    angles = np.array(result.angles)
+    direction = np.random.default_rng(5).normal(size=angles.shape)
+    h = 1e-6
+
+    def at(t: float) -> tuple[float, np.ndarray, object]:
+        return _core.glide_energy(problem, 0.0, 0.0, 1.0, 1.0, angles + t * direction)
+
+    slope = (at(h)[0] - at(-h)[0]) / (2 * h)
+    assert at(0.0)[1] @ direction.ravel() == pytest.approx(slope, rel=1e-6)
+    assert at(0.0)[0] > _core.glide_energy(plain, 0.0, 0.0, 1.0, 1.0, angles)[0]
+
+
 def test_model_is_convex_and_bounded_by_nothing_but_convexity(
     glide: tuple[_core.GlideProblem, np.ndarray],
 ) -> None:
