@@ -95,7 +95,9 @@ SurfaceWeights weights_of(double area, double shape, double chart) { return {are
 void bind_glide(py::module_& m) {
   py::class_<GlideProblem>(m, "GlideProblem")
       .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio,
-                       bool facing) { return GlideProblem{chart, reference, ratio, facing}; }),
+                       bool facing) {
+             return GlideProblem{chart, reference, ratio, facing};
+           }),
            py::arg("chart"), py::arg("reference"), py::arg("ratio"), py::arg("facing") = false,
            release_gil());
   m.def(
