@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
@@ -48,9 +49,7 @@ GlideStep SurfaceNewton::step(const SurfaceWeights& weights) {
   const double scale = best_scale(problem_, angles_);
   const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
   factorise(here.hessians);
-  Rows solution = Rows::Zero(here.gradient.size(), 1);
-  solver_->solve(-here.gradient, solution, {1e-6, 3, false});
-  const Vec flat = solution.col(0);
+  const Vec flat = solver_->solve(-here.gradient);
   const Points2 direction = as_rows(flat);
 
   const double slope = here.gradient.dot(flat);
@@ -69,21 +68,12 @@ GlideStep SurfaceNewton::step(const SurfaceWeights& weights) {
 }
 
 void SurfaceNewton::factorise(const Rows& hessians) {
-  if (!solver_) {
-    SparseMatrix matrix = pattern_.zeros();
-    assemble(hessians, matrix);
-    solver_.emplace(std::move(matrix), SpdOptions{"direct"});
-    return;
-  }
-  assemble(hessians, solver_->matrix());
-  solver_->refactor();
-}
-
-void SurfaceNewton::assemble(const Rows& hessians, SparseMatrix& matrix) const {
+  SparseMatrix matrix = pattern_.zeros();
   pattern_.scatter(hessians, matrix.valuePtr());
-  const Vec diagonal = matrix.diagonal();
-  const double ridge = kRidge * diagonal.mean();
+  const double ridge = kRidge * Vec(matrix.diagonal()).mean();
   for (Index i = 0; i < matrix.rows(); ++i) matrix.coeffRef(i, i) += ridge;
+  if (!solver_) solver_.emplace(matrix);
+  solver_->factorise(matrix);
 }
 
 // At most 1, and at most nine tenths of the way to the first face of no area in the (u, v) chart.
@@ -113,9 +103,13 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd,
     return figures();
   };
   SurfaceFigures now = before;
-  for (int step = 0; step < kBestSteps; ++step) now = take(RingStep::kBest);
-  for (int step = 0; step < kStiffSteps && now.ring_sd > kRingGoal; ++step)
-    now = take(RingStep::kStiff);
+  try {
+    for (int step = 0; step < kBestSteps; ++step) now = take(RingStep::kBest);
+    for (int step = 0; step < kStiffSteps && now.ring_sd > kRingGoal; ++step)
+      now = take(RingStep::kStiff);
+  } catch (const Error&) {  // singular: nothing to be had
+    now.ring_sd = std::numeric_limits<double>::infinity();
+  }
   if (now.flips == 0 && now.ring_sd <= kRingGoal &&
       now.face_sd <= std::max(before.face_sd, face_sd) &&
       now.face_error <= std::max(before.face_error, face_error))

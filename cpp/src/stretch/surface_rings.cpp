@@ -10,9 +10,12 @@ namespace stretchmap {
 
 namespace {
 
-// The shares sum to one, so one equation follows from the others: a little give in each of them
-// makes the system quasi-definite, and then it has a factorisation in any order.
-constexpr double kGive = 1e-10;
+// A little give in the ring equations makes the system quasi-definite, and then it has a
+// factorisation in any order. The solution is refined against the equations without it.
+constexpr double kGive = 1e-9;
+constexpr double kRidge = 1e-10;  // holds the rotation about the axis
+constexpr int kRefinements = 3;
+constexpr double kAccuracy = 1e-7;
 
 struct Rings {
   Vec source, image;  // (n) areas of the rings
@@ -60,6 +63,16 @@ Rows elements(const GlideProblem& problem, const Rings& rings, const Rows& hessi
   return blocks;
 }
 
+SparseMatrix with_give(SparseMatrix matrix) {
+  const Index n = static_cast<Index>(matrix.rows()) / 3;
+  const double size = Vec(matrix.diagonal()).sum() / (2.0 * n);
+  double coupling = 0.0;
+  for (Index i = 2; i < 3 * n; i += 3) coupling += matrix.row(i).squaredNorm() / n;
+  for (Index i = 0; i < 3 * n; ++i)
+    matrix.coeffRef(i, i) += i % 3 == 2 ? -kGive * coupling / size : kRidge * size;
+  return matrix;
+}
+
 }  // namespace
 
 Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
@@ -70,30 +83,22 @@ Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weig
   if (kind == RingStep::kStiff) model.area = 0.0;
   GlideEnergy energy = glide_energy(problem, model, scale, angles, Derivatives::kModel);
   if (kind == RingStep::kStiff) energy.gradient.setZero();
-  SparseMatrix matrix = pattern_.zeros();
-  pattern_.scatter(elements(problem, rings, energy.hessians), matrix.valuePtr());
-  Vec diagonal = matrix.diagonal();
-  const double size = diagonal.sum() / (2.0 * n);
-  double coupling = 0.0;
-  for (Index i = 2; i < 3 * n; i += 3) coupling += matrix.row(i).squaredNorm() / n;
+  SparseMatrix exact = pattern_.zeros();
+  pattern_.scatter(elements(problem, rings, energy.hessians), exact.valuePtr());
   Vec right(3 * n);
   for (Index i = 0; i < n; ++i) {
-    matrix.coeffRef(3 * i, 3 * i) += kGive * size;
-    matrix.coeffRef(3 * i + 1, 3 * i + 1) += kGive * size;
-    matrix.coeffRef(3 * i + 2, 3 * i + 2) = -kGive * coupling / size;
     right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
     right(3 * i + 2) = 1.0 - rings.image(i) / (rings.total * rings.source(i));
   }
-  // A symmetric matrix in compressed rows is itself in compressed columns.
-  const Eigen::Map<const Columns> columns(3 * n, 3 * n, matrix.nonZeros(), matrix.outerIndexPtr(),
-                                          matrix.innerIndexPtr(), matrix.valuePtr());
-  if (!analysed_) factor_.analyzePattern(columns);
-  analysed_ = true;
-  factor_.factorize(columns);
-  if (factor_.info() != Eigen::Success)
-    throw Error("SolverError", "the equations for exact ring areas are singular");
-  Vec solution = factor_.solve(right);
-  solution += factor_.solve(right - matrix * solution);
+  const SparseMatrix yielding = with_give(exact);
+  if (!factor_) factor_.emplace(yielding);
+  factor_->factorise(yielding);
+  Vec solution = factor_->solve(right);
+  for (int i = 0; i < kRefinements; ++i) {
+    const Vec residual = right - exact * solution;
+    if (residual.norm() <= kAccuracy * right.norm()) break;
+    solution += factor_->solve(residual);
+  }
   Points2 change(n, 2);
   for (Index i = 0; i < n; ++i) change.row(i) = solution.segment<2>(3 * i).transpose();
   return change;

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/linalg/block_ldlt.hpp"
 #include "stretchmap/stretch/surface_energy.hpp"
 #include "stretchmap/stretch/surface_pattern.hpp"
 #include "stretchmap/stretch/surface_rings.hpp"
@@ -41,14 +41,13 @@ class SurfaceNewton {
 
  private:
   void factorise(const Rows& hessians);
-  void assemble(const Rows& hessians, SparseMatrix& matrix) const;
   double longest_step(const Points2& direction) const;
 
   GlideProblem problem_;
   Points2 angles_;
   SurfacePattern pattern_;
   std::optional<RingSystem> rings_;
-  std::optional<SpdSolver> solver_;  // from the first step on
+  std::optional<BlockLdlt<2>> solver_;  // from the first step on
 };
 
 }  // namespace stretchmap

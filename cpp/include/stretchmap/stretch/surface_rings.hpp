@@ -1,8 +1,9 @@
 // Ring areas made exact: n equations for 2n unknowns, so there is room to keep the faces good.
 #pragma once
 
-#include <Eigen/SparseCholesky>
+#include <optional>
 
+#include "stretchmap/linalg/block_ldlt.hpp"
 #include "stretchmap/stretch/surface_energy.hpp"
 #include "stretchmap/stretch/surface_pattern.hpp"
 
@@ -28,11 +29,8 @@ class RingSystem {
                const Points2Ref& angles, RingStep kind);
 
  private:
-  using Columns = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
-
   SurfacePattern pattern_;
-  Eigen::SimplicialLDLT<Columns> factor_;
-  bool analysed_ = false;
+  std::optional<BlockLdlt<3>> factor_;  // from the first step on
 };
 
 }  // namespace stretchmap
