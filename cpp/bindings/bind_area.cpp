@@ -90,9 +90,18 @@ void bind_quality(py::module_& m) {
         py::arg("turns").noconvert(), py::arg("candidates").noconvert(), release_gil());
 }
 
+template <int K>
+Vec solve_once(const SparseMatrix& matrix, const VecRef& right) {
+  BlockLdlt<K> factor(matrix);
+  factor.factorise(matrix);
+  return factor.solve(right);
+}
+
 SurfaceWeights weights_of(double area, double shape, double chart) { return {area, shape, chart}; }
 
 void bind_glide(py::module_& m) {
+  m.def("block_ldlt_solve_2", &solve_once<2>, py::arg("matrix"), py::arg("right"), release_gil());
+  m.def("block_ldlt_solve_3", &solve_once<3>, py::arg("matrix"), py::arg("right"), release_gil());
   py::class_<GlideProblem>(m, "GlideProblem")
       .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio,
                        bool facing) {
@@ -134,7 +143,8 @@ void bind_glide(py::module_& m) {
           "project_rings",
           [](SurfaceNewton& self, double area, double shape, double chart, double face_sd,
              double face_error) {
-            return self.project_rings(weights_of(area, shape, chart), face_sd, face_error);
+            return self.project_rings(weights_of(area, shape, chart), face_sd, face_error,
+                                      signal_poll());
           },
           py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("face_sd"),
           py::arg("face_error"), release_gil())

@@ -123,7 +123,7 @@ def area_map(
     phase: float | None = None,
     ratio: str | float = "conformal",
     finish: str = "ring",
-    max_iter: int = 20,
+    max_iter: int = 30,
     tol: float = 5e-3,
     shape_budget: float = 1.2,
     sem_iter: int = 10,

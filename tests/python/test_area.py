@@ -7,6 +7,7 @@ import logging
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import stretchmap
 from stretchmap import TriMesh, _core, area_map
@@ -242,6 +243,61 @@ def _singular_values(p: np.ndarray, q: np.ndarray) -> np.ndarray:
         return np.linalg.qr(np.column_stack([t[1] - t[0], t[2] - t[0]]))[1]
 
     return np.linalg.svd(flat(q) @ np.linalg.inv(flat(p)), compute_uv=False)
+
+
+def _block_system(block: int, quasi: bool) -> sparse.csr_matrix:
+    """Full blocks on the pattern of a torus; the last unknown of each block a multiplier or not."""
+    faces = torus_grid(9, 7, 2.0, seed=8).F
+    rng = np.random.default_rng(6)
+    n = block * (faces.max() + 1)
+    signs = np.ones(block)
+    if quasi:
+        signs[-1] = -1.0
+    rows, columns, values = [], [], []
+    for face in faces:
+        unknowns = (block * face[:, None] + np.arange(block)).ravel()
+        half = rng.normal(size=(len(unknowns), len(unknowns)))
+        s = np.tile(signs, 3)
+        part = half @ half.T
+        part[np.multiply.outer(s, s) < 0.0] *= 3.0
+        part[np.ix_(s < 0.0, s < 0.0)] *= -1e-4
+        rows.append(np.repeat(unknowns, len(unknowns)))
+        columns.append(np.tile(unknowns, len(unknowns)))
+        values.append(part.ravel())
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sparse.csr_matrix(entries, shape=(n, n))
+
+
+@pytest.mark.parametrize(("block", "quasi"), [(2, False), (3, False), (2, True), (3, True)])
+def test_block_factor_against_scipy(block: int, quasi: bool) -> None:
+    matrix = _block_system(block, quasi)
+    right = np.random.default_rng(9).normal(size=matrix.shape[0])
+    solve = _core.block_ldlt_solve_2 if block == 2 else _core.block_ldlt_solve_3
+    expected = sparse.linalg.spsolve(matrix.tocsc(), right)
+    np.testing.assert_allclose(solve(matrix, right), expected, atol=1e-8 * abs(expected).max())
+
+
+def test_singular_pivot_is_an_error() -> None:
+    matrix = _block_system(2, False)
+    matrix.data[:] = 0.0
+    with pytest.raises(SolverError, match="pivot"):
+        _core.block_ldlt_solve_2(matrix, np.ones(matrix.shape[0]))
+
+
+def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
+    conformal = conformal_map(bumpy)
+    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
+    candidates = np.array([[0.0, 1.5], [0.3, 2.2], [-0.45, 5.0]])
+    rated = _core.phase_qualities(reference, bumpy.F, conformal.turns, candidates)
+    for (phase, ratio), quality in zip(candidates, rated, strict=True):
+        image = _core.torus_image(conformal.turns, phase, ratio)
+        exact = _core.surface_quality(reference, bumpy.F, image)
+        assert quality.energy == pytest.approx(exact.energy, rel=1e-4)
+        assert quality.angle_mean == pytest.approx(exact.angle_mean, rel=1e-4)
+    similar = _core.surface_quality(reference, bumpy.F, 2.0 * bumpy.V)
+    assert similar.energy == pytest.approx(1.0, abs=1e-12)
+    assert similar.angle_max == pytest.approx(1.0, abs=1e-7)
+    assert similar.face_sd < 1e-12
 
 
 def test_newton_refuses_a_start_with_flips(

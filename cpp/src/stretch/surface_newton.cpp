@@ -24,6 +24,12 @@ Points2 as_rows(const Vec& vector) {
   return Eigen::Map<const Points2>(vector.data(), vector.size() / 2, 2);
 }
 
+// Rotations about the axis cost nothing; without this rounding decides how far they go.
+Points2 without_rotation(Points2 direction) {
+  direction.col(0).array() -= direction.col(0).mean();
+  return direction;
+}
+
 std::vector<Index> flipped(const GlideProblem& problem, const Points2& angles) {
   const Vec areas = turn_areas(problem.chart, angles / kTwoPi);
   std::vector<Index> faces;
@@ -50,7 +56,7 @@ GlideStep SurfaceNewton::step(const SurfaceWeights& weights) {
   const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
   factorise(here.hessians);
   const Vec flat = solver_->solve(-here.gradient);
-  const Points2 direction = as_rows(flat);
+  const Points2 direction = without_rotation(as_rows(flat));
 
   const double slope = here.gradient.dot(flat);
   GlideStep result{here.value, here.value, 0.0, -slope};
@@ -91,14 +97,15 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
   return longest;
 }
 
-bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd,
-                                  double face_error) {
+bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd, double face_error,
+                                  const Poll& poll) {
   if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
   const SurfaceFigures before = figures();
   const auto take = [&](RingStep kind) {
-    const Points2 direction =
-        rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind);
+    if (poll) poll();
+    const Points2 direction = without_rotation(
+        rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind));
     angles_ += longest_step(direction) * direction;
     return figures();
   };

@@ -32,7 +32,8 @@ class SurfaceNewton {
   // Makes the ring areas exact: two steps of RingSystem that are best for the faces, then stiff
   // ones. Refused (false, nothing changed) if that cannot be done without a flip or raises a
   // figure of the faces above both what it was and the limit given.
-  bool project_rings(const SurfaceWeights& weights, double face_sd, double face_error);
+  bool project_rings(const SurfaceWeights& weights, double face_sd, double face_error,
+                     const Poll& poll = {});
 
   // Of the polyhedral image.
   SurfaceFigures figures() const;

@@ -31,7 +31,7 @@ SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef
 // coordinate shifted by `phase` turns.
 Points torus_image(const Points2Ref& turns, double phase, double ratio);
 
-// Quality of torus_image for each candidate (phase, ratio), (k, 2).
+// Quality of torus_image for each candidate (phase, ratio), (k, 2), to about 1e-6.
 std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
                                             const FacesRef& faces, const Points2Ref& turns,
                                             const Points2Ref& candidates);
