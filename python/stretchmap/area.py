@@ -36,7 +36,7 @@ _GROWTH = 4.0
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
 _STALLED = 3  # steps in a row without any length end the iteration
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
-_MARGIN = 0.8  # the Newton steps go on to this part of tol: the projection of the rings needs some
+_MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings need some room
 _FAIR = 4.0  # from this face SD on, in units of tol, the shape budget counts
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 _SAMPLE = 6000  # faces that suffice for the search
@@ -398,7 +398,7 @@ def _finish(
         least = min(least, figures.angle_mean)
         history.append(_record(iteration, taken, figures, start))
         report(progress, "area", iteration, max_iter, face_sd=figures.face_sd)
-        if _within(figures, _MARGIN * tol):
+        if figures.face_sd <= _MARGIN * tol and _within(figures, tol):
             break
         if stalled == _STALLED:
             reason = "no step lowers the energy"
