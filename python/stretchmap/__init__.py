@@ -51,6 +51,9 @@ _EXPORTS = {
     "torus_coordinates": "coordinates",
     "partition": "partitions",
     "register": "registration",
+    "hex_mesh": "resample",
+    "transfer": "resample",
+    "morph": "morphing",
 }
 _MODULES = {"errors", "samples", "plot"}
 

@@ -463,7 +463,7 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     solid, target = registration.solid, registration.target
     first, second = solid.surface, target.surface
     image = registration.image[solid.boundary_vertices]
-    rotation, scale, shift = _similarity(first.V, image)
+    rotation, scale, shift = similarity(first.V, image)
     moved = scale * first.V @ rotation + shift
     there, back = cKDTree(second.V), cKDTree(moved)
     _, partner = there.query(moved)
@@ -493,7 +493,7 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     )
 
 
-def _similarity(
+def similarity(
     points: NDArray[np.float64], images: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
     """Rotation, scale, shift with ``scale * points @ rotation + shift`` nearest to the images."""

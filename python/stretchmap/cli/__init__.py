@@ -22,7 +22,7 @@ from collections.abc import Sequence
 
 __all__ = ["GROUPS", "main"]
 
-GROUPS = ("meshes", "maps", "pictures")
+GROUPS = ("meshes", "maps", "pictures", "applications")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,32 @@
+"""Solid-torus coordinates at any point, the way back, and a structured hexahedral mesh.
+
+Run: python examples/coordinates_and_grid.py [grid.vtu]
+"""
+
+import sys
+
+import numpy as np
+
+import stretchmap as sm
+from stretchmap.resample import hex_mesh
+from stretchmap.samples import vertebra_like
+
+solid = vertebra_like(12_000)
+result = sm.volume_map(solid)
+points = result.solid.V[result.solid.T].mean(axis=1)
+u, v, s = sm.torus_coordinates(result, points).T
+print(f"{len(points)} points: s / r from {s.min() / result.torus.r:.3f} to "
+      f"{s.max() / result.torus.r:.3f}")  # fmt: skip
+
+there = sm.forward(result, points)
+back = sm.inverse(result, there)
+size = np.linalg.norm(np.ptp(solid.V, axis=0))
+print(f"there and back: {np.abs(back - points).max() / size:.1e} of the size")
+assert np.abs(back - points).max() < 1e-9 * size
+assert np.isnan(sm.forward(result, [[1e3, 0.0, 0.0]])).all()  # outside: told, not guessed
+
+grid = hex_mesh(result, sections=48)
+print(grid.summary())
+assert grid.n_negative == 0
+if len(sys.argv) > 1:
+    grid.save(sys.argv[1])

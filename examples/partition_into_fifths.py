@@ -1,0 +1,23 @@
+"""Divide a solid into shells, sectors and cells of prescribed volume.
+
+Run: python examples/partition_into_fifths.py [parts.vtu]
+"""
+
+import sys
+
+import numpy as np
+
+import stretchmap as sm
+from stretchmap.samples import bumpy_torus
+
+result = sm.volume_map(bumpy_torus(12_000))
+for by in ("s", "u", "v"):
+    parts = sm.partition(result, 5, by)
+    print(parts.summary(), end="\n\n")
+    assert np.abs(parts.errors).max() < 1e-12
+
+cells = sm.partition(result, (6, [0.5, 0.5]), ("u", "s"))
+print(cells.summary())
+assert cells.n_parts == 12
+if len(sys.argv) > 1:
+    cells.save(sys.argv[1])

@@ -1,0 +1,191 @@
+"""Commands that use maps: register, partition, resample, morph."""
+
+from __future__ import annotations
+
+import logging
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from . import _common as common
+from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet
+from .maps import conclude
+
+if TYPE_CHECKING:
+    from ..results import LoadedMap
+
+_log = logging.getLogger("stretchmap")
+
+
+class Spread(str, Enum):
+    """Values of ``--h``."""
+
+    smooth = "smooth"
+    affine = "affine"
+
+
+class Conserve(str, Enum):
+    """Values of ``--conserve``."""
+
+    integral = "integral"
+    mean = "mean"
+
+
+Target = Annotated[
+    Path, typer.Argument(metavar="TARGET", help="Mesh of the target.", show_default=False)
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this module."""
+    app.command("register")(register_solids)
+    for command in (partition, resample, morph):
+        app.command()(command)
+
+
+def register_solids(
+    input: Input,
+    target: Target,
+    output: Output,
+    landmarks: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV: two vertex ids or six coordinates (source, target) per row.",
+            show_default=False,
+        ),
+    ] = None,
+    h: Annotated[
+        Spread, typer.Option("--h", help="How landmarks are reached on the surface.")
+    ] = Spread.smooth,
+    keep_best: Annotated[
+        bool,
+        typer.Option("--keep-best", help="Write the map even if it is not certified; exit code 1."),
+    ] = False,
+    json: Json = None,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> int:
+    """Map one solid torus onto another, landmarks to landmarks, volumes preserved."""
+    from ..progress import terminal
+    from ..registration import register as register_meshes
+
+    inputs = [path for path in (input, target, landmarks) if path is not None]
+    common.check_outputs(output, common.map_suffixes(), json, *inputs)
+    watch = common.Stopwatch()
+    source, goal = (
+        common.require_solid(common.read_mesh(path, orient, compact), path, "register")
+        for path in (input, target)
+    )
+    watch.lap("read")
+    with terminal(quiet) as bar:
+        result = register_meshes(
+            source, goal, landmarks, h=h.value, keep_best=keep_best, progress=bar
+        )
+    watch.lap("compute")
+    conclude(result, output, json, quiet, watch)
+    if not result.certificate.certified:
+        _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
+        return 1
+    return 0
+
+
+def partition(
+    map_file: MapFile,
+    output: Output,
+    by: Annotated[
+        str, typer.Option(help="s (shells), u or v (sectors), or several for a grid: u,s.")
+    ] = "s",
+    fractions: Annotated[
+        str,
+        typer.Option(
+            help="Number of equal parts or their shares, 0.2,0.3,0.5; one entry per coordinate, "
+            "separated by colons."
+        ),
+    ] = "5",
+    start: Annotated[float, typer.Option(help="Angle where the first sector begins.")] = 0.0,
+    correct: Annotated[bool, typer.Option(help="Move the levels until volumes are exact.")] = True,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> None:
+    """Divide a mapped solid into parts of prescribed volume."""
+    from ..io import suffixes
+    from ..partitions import partition as cut
+
+    common.check_outputs(output, suffixes(solid=True), json, map_file)
+    loaded = _solid_map(map_file, "partition")
+    axes = tuple(name.strip() for name in by.split(","))
+    shares = tuple(_shares(entry) for entry in fractions.split(":"))
+    if len(axes) == 1 and len(shares) == 1:
+        parts = cut(loaded, shares[0], axes[0], start=start, correct=correct)
+    else:
+        parts = cut(loaded, shares, axes, start=start, correct=correct)
+    common.write_together(output, parts.save, json, parts.to_dict())
+    if not quiet:
+        typer.echo(parts.summary())
+
+
+def resample(
+    map_file: MapFile,
+    output: Output,
+    sections: Annotated[int, typer.Option(help="Hexahedra round the axis.")] = 64,
+    block: Annotated[int, typer.Option(help="Hexahedra along a side of the middle block.")] = 4,
+    rings: Annotated[int, typer.Option(help="Layers between block and boundary.")] = 4,
+    repair: Annotated[bool, typer.Option(help="Make all corner Jacobians positive.")] = True,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> int:
+    """Structured hexahedral mesh of a mapped solid; exit code 1 if a Jacobian is not positive."""
+    from ..resample import hex_mesh
+
+    common.check_outputs(output, (".vtu", ".vtk"), json, map_file)
+    mesh = hex_mesh(
+        _solid_map(map_file, "resample"), sections=sections, block=block, rings=rings, repair=repair
+    )
+    common.write_together(output, mesh.save, json, mesh.to_dict())
+    if not quiet:
+        typer.echo(mesh.summary())
+    if mesh.n_negative:
+        _log.error("%d hexahedra have a corner that is not positive", mesh.n_negative)
+        return 1
+    return 0
+
+
+def morph(
+    map_file: MapFile,
+    output: Output,
+    frames: Annotated[int, typer.Option(help="Number of frames, both ends included.")] = 21,
+    quiet: Quiet = False,
+) -> None:
+    """Linear homotopy from source to image: .pvd with a .vtu per frame, or an animated .gif."""
+    from ..morphing import morph as homotopy
+
+    common.check_output(output, (".pvd", ".gif"), map_file)
+    result = homotopy(_solid_map(map_file, "morph"), frames)
+    result.save(output)
+    if not quiet:
+        typer.echo(result.summary())
+
+
+def _solid_map(path: Path, command: str) -> LoadedMap:
+    from ..errors import MeshError
+    from ..results import load_map
+
+    loaded = load_map(path)
+    if loaded.solid is None:
+        raise MeshError(f"{path} holds the map of a surface, '{command}' needs that of a solid")
+    return loaded
+
+
+def _shares(entry: str) -> int | list[float]:
+    from ..errors import OptionError
+
+    try:
+        values = [float(value) for value in entry.split(",")]
+    except ValueError:
+        raise OptionError(f"--fractions must hold numbers, got {entry!r}") from None
+    if len(values) == 1 and values[0] == int(values[0]):
+        return int(values[0])
+    return values

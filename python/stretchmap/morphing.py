@@ -1,0 +1,171 @@
+"""Linear homotopy between a solid and its image, as numbered frames or an animated picture."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core, io
+from ._arrays import read_only
+from .errors import FileFormatError, MissingDependencyError, OptionError
+from .mesh import TetMesh
+from .results import atomic_path, plain, table
+
+if TYPE_CHECKING:
+    from .results import MapResult
+
+__all__ = ["Morph", "morph"]
+
+
+@dataclass(frozen=True, eq=False)
+class Morph:
+    """The straight way of every vertex from source to image.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        The source.
+    image : ndarray, shape (n, 3)
+        Turned, shifted and scaled onto the source as well as a similarity can, if asked for.
+    times : ndarray, shape (f,)
+        From 0 (source) to 1 (image).
+    flips : ndarray of int, shape (f,)
+        Tets that are not positive in each frame. Both ends may be free of them and the way between
+        not: nothing protects a linear homotopy.
+    """
+
+    solid: TetMesh
+    image: NDArray[np.float64]
+    times: NDArray[np.float64]
+    flips: NDArray[np.intp]
+
+    def frame(self, i: int) -> NDArray[np.float64]:
+        """(n, 3) vertices of frame i."""
+        t = self.times[i]
+        return (1.0 - t) * self.solid.V + t * self.image
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures, JSON-compatible."""
+        return plain({"frames": len(self.times), "most_flips": int(self.flips.max())})
+
+    def summary(self) -> str:
+        """A table of the figures."""
+        return table(self.to_dict())
+
+    def save(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Write ``.pvd`` with one ``.vtu`` per frame beside it, or an animated ``.gif``.
+
+        Returns
+        -------
+        list of Path
+            Every file written.
+
+        Raises
+        ------
+        FileFormatError
+            Another suffix.
+        MissingDependencyError
+            meshio (frames) or matplotlib and pillow (picture) are not installed.
+        OSError
+            If a file cannot be written.
+        """
+        path = Path(path)
+        suffix = path.suffix.lower()
+        if suffix == ".pvd":
+            return self._save_frames(path)
+        if suffix == ".gif":
+            return self._save_picture(path)
+        raise FileFormatError(f"{path}: a morph is written as .pvd or .gif")
+
+    def _save_frames(self, path: Path) -> list[Path]:
+        written, lines = [], []
+        for i, t in enumerate(self.times):
+            frame = path.with_name(f"{path.stem}_{i:03d}.vtu")
+            io.write(frame, TetMesh(self.frame(i), self.solid.T))
+            written.append(frame)
+            lines.append(f'    <DataSet timestep="{t:.6g}" file={quoteattr(frame.name)}/>')
+        text = "\n".join(
+            ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>",
+             *lines, "  </Collection>", "</VTKFile>", ""]
+        )  # fmt: skip
+        with atomic_path(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        return [*written, path]
+
+    def _save_picture(self, path: Path) -> list[Path]:
+        try:
+            from matplotlib.animation import FuncAnimation, PillowWriter
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+            from matplotlib.figure import Figure
+        except ImportError:
+            raise MissingDependencyError(
+                "animated pictures need matplotlib: pip install 'stretchmap[plot]'"
+            ) from None
+        figure = Figure(figsize=(5, 5))
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot(projection="3d")
+        ids, faces = self.solid.boundary_vertices, self.solid.surface.F
+        corners = np.concatenate([self.solid.V[ids], self.image[ids]])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+
+        def draw(i: int) -> list[Any]:
+            axes.clear()
+            axes.set_axis_off()
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+            axes.set_box_aspect(high - low)
+            points = self.frame(i)[ids]
+            return [axes.plot_trisurf(*points.T, triangles=faces, color="#5b8fb9", linewidth=0)]
+
+        # There and back, so that the end meets the beginning.
+        order = [*range(len(self.times)), *range(len(self.times) - 2, 0, -1)]
+        animation = FuncAnimation(figure, draw, frames=order)
+        with atomic_path(path) as temporary:
+            animation.save(temporary, writer=PillowWriter(fps=12))
+        return [path]
+
+
+def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
+    """Linear homotopy ``(1 - t) x + t f(x)`` from a solid to its image.
+
+    Parameters
+    ----------
+    result : Registration, VolumeMap or LoadedMap
+        Map of a solid.
+    frames : int
+        Number of frames, both ends included, at least 2.
+    align : bool
+        Turn, shift and scale the image onto the source first (least squares, no reflection); else
+        the solid travels and turns on its way.
+
+    Returns
+    -------
+    Morph
+
+    Raises
+    ------
+    OptionError
+        Fewer than two frames, or the map of a surface.
+    """
+    solid = result.mesh
+    if not isinstance(solid, TetMesh):
+        raise OptionError("only the map of a solid can be morphed, this is that of a surface")
+    if frames < 2:
+        raise OptionError(f"a morph has at least two frames, got {frames}")
+    image = np.asarray(result.image)
+    if align:
+        from .registration import similarity
+
+        rotation, scale, shift = similarity(image, solid.V)
+        image = scale * image @ rotation + shift
+    times = np.linspace(0.0, 1.0, frames)
+    flips = [
+        int((~(_core.signed_tet_volumes((1.0 - t) * solid.V + t * image, solid.T) > 0.0)).sum())
+        for t in times
+    ]
+    return Morph(solid, read_only(image), read_only(times), read_only(np.array(flips)))

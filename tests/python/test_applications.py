@@ -1,0 +1,127 @@
+"""Morphs, and the commands register, partition, resample and morph."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap import samples
+from stretchmap.errors import FileFormatError, OptionError
+from stretchmap.morphing import morph
+
+RNG = np.random.default_rng(4)
+
+
+@pytest.fixture(scope="module")
+def bumpy_map():
+    return sm.volume_map(samples.bumpy_torus(3000))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, bumpy_map):
+    """A folder with two solids, their landmarks and a map file."""
+    folder = tmp_path_factory.mktemp("applications")
+    pair = samples.vertebra_pair(n_landmarks=20, n_tets=(3000, 4000))
+    sm.write(folder / "a.npz", pair.source)
+    sm.write(folder / "b.npz", pair.target)
+    rows = zip(pair.source_landmarks, pair.target_landmarks, strict=True)
+    (folder / "marks.csv").write_text("\n".join(f"{a},{b}" for a, b in rows))
+    bumpy_map.save(folder / "map.npz")
+    return folder
+
+
+def run(*arguments):
+    pytest.importorskip("typer")
+    from stretchmap.cli import main
+
+    return main([str(argument) for argument in arguments])
+
+
+def test_morph_is_linear_between_source_and_image(bumpy_map):
+    result = morph(bumpy_map, 5, align=False)
+    assert np.array_equal(result.frame(0), bumpy_map.solid.V)
+    assert np.allclose(result.frame(4), bumpy_map.image)
+    assert np.allclose(result.frame(2), 0.5 * (bumpy_map.solid.V + bumpy_map.image))
+    assert result.flips[0] == result.flips[-1] == 0
+
+
+def test_alignment_undoes_a_similarity():
+    solid = samples.vertebra_like(3000)
+    from test_coordinates import a_map
+
+    Q = np.linalg.qr(RNG.standard_normal((3, 3)))[0]
+    Q *= np.sign(np.linalg.det(Q))
+    result = morph(a_map(solid, 2.0 * solid.V @ Q + 5.0), 4)
+    assert np.allclose(result.image, solid.V, atol=1e-12) and not result.flips.any()
+
+
+def test_morph_files(bumpy_map, tmp_path):
+    pytest.importorskip("meshio")
+    result = morph(bumpy_map, 3)
+    written = result.save(tmp_path / "m.pvd")
+    assert [path.name for path in written] == ["m_000.vtu", "m_001.vtu", "m_002.vtu", "m.pvd"]
+    assert np.allclose(sm.read(written[1]).V, result.frame(1))
+    assert all(path.name in written[-1].read_text() for path in written[:-1])
+    with pytest.raises(FileFormatError):
+        result.save(tmp_path / "m.mp4")
+    with pytest.raises(OptionError):
+        morph(bumpy_map, 1)
+    with pytest.raises(OptionError):
+        morph(sm.area_map(bumpy_map.solid.surface))
+
+
+def test_morph_picture(bumpy_map, tmp_path):
+    pytest.importorskip("matplotlib")
+    pillow = pytest.importorskip("PIL.Image")
+    morph(bumpy_map, 3).save(tmp_path / "m.gif")
+    with pillow.open(tmp_path / "m.gif") as picture:
+        assert picture.n_frames == 4
+
+
+def test_register_command(folder, capsys):
+    out = folder / "r.npz"
+    code = run("register", folder / "a.npz", folder / "b.npz", "--landmarks", folder / "marks.csv",
+               "-o", out, "--json", folder / "r.json")  # fmt: skip
+    assert code == 0
+    report = json.loads((folder / "r.json").read_text())
+    assert report["certified"] and report["landmarks"] == 20 and report["landmark_error"] < 1e-6
+    assert sm.load_map(out).title == "registration"
+    assert "landmark error" in capsys.readouterr().out
+
+
+def test_register_command_names_bad_landmarks(folder, capsys):
+    (folder / "bad.csv").write_text("0,0\n1,x\n")
+    code = run("register", folder / "a.npz", folder / "b.npz", "--landmarks", folder / "bad.csv",
+               "-o", folder / "bad.npz")  # fmt: skip
+    assert code == 2 and not (folder / "bad.npz").exists()
+    assert "two vertex ids or six coordinates" in capsys.readouterr().err
+
+
+def test_partition_command(folder):
+    out = folder / "parts.npz"
+    arguments = ("partition", folder / "map.npz", "-o", out, "-q", "--json", folder / "p.json")
+    assert run(*arguments, "--by", "u", "--fractions", "0.2,0.3,0.5") == 0
+    report = json.loads((folder / "p.json").read_text())
+    assert np.abs(report["errors"]).max() < 1e-12 and len(report["volumes"]) == 3
+    assert run(*arguments, "--by", "u,s", "--fractions", "4:2") == 0
+    assert len(json.loads((folder / "p.json").read_text())["volumes"]) == 8
+    assert run(*arguments, "--fractions", "many") == 2
+    assert run(*arguments, "--by", "x") == 2
+
+
+def test_resample_and_morph_commands(folder):
+    pytest.importorskip("meshio")
+    assert run("resample", folder / "map.npz", "-o", folder / "grid.vtu", "--sections", 24) == 0
+    assert run("resample", folder / "map.npz", "-o", folder / "grid.stl") == 2
+    assert run("morph", folder / "map.npz", "-o", folder / "m.pvd", "--frames", 3) == 0
+    assert (folder / "m_002.vtu").exists()
+
+
+def test_commands_refuse_maps_of_surfaces(folder, bumpy_map, capsys):
+    sm.area_map(bumpy_map.solid.surface).save(folder / "surface.npz")
+    for command, output in (("partition", "x.npz"), ("resample", "x.vtu"), ("morph", "x.pvd")):
+        assert run(command, folder / "surface.npz", "-o", folder / output) == 2
+        assert "map of a surface" in capsys.readouterr().err
