@@ -232,8 +232,9 @@ def test_renumbering_rotating_and_scaling_the_input_changes_nothing(bumpy):
     Q *= np.sign(np.linalg.det(Q))
     moved = TetMesh(37.0 * bumpy.V[order] @ Q.T + 5.0, rank[bumpy.T])
     other = sm.volume_map(moved, c=0.0, max_iter=5).distortion
-    assert other.ring_sd == pytest.approx(reference.ring_sd, rel=1e-4)
-    assert other.total_distortion == pytest.approx(reference.total_distortion, rel=1e-4)
+    # The boundary map stops at a tolerance; how far beyond it depends on rounding.
+    assert other.ring_sd == pytest.approx(reference.ring_sd, rel=1e-3)
+    assert other.total_distortion == pytest.approx(reference.total_distortion, rel=1e-3)
 
 
 @pytest.mark.parametrize(
