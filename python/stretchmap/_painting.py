@@ -32,10 +32,13 @@ class View:
     ----------
     elevation, azimuth : float
         Degrees above the xy-plane and around the z-axis.
+    frame : (3, 3) ndarray, optional
+        Rotation whose rows are to be taken for the directions x, y and z.
     """
 
     elevation: float = 35.0
     azimuth: float = -60.0
+    frame: Array | None = None
 
     @property
     def axes(self) -> Array:
@@ -43,7 +46,8 @@ class View:
         e, a = math.radians(self.elevation), math.radians(self.azimuth)
         towards = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
         right = np.array([-math.sin(a), math.cos(a), 0.0])
-        return np.stack([right, np.cross(towards, right), towards])
+        axes = np.stack([right, np.cross(towards, right), towards])
+        return axes if self.frame is None else axes @ self.frame
 
 
 @dataclass

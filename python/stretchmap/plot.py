@@ -265,8 +265,9 @@ def checkerboard(result: MapResult, cells: tuple[int, int] = (24, 8)) -> Figure:
     figure = _figure(9.6, 4.6)
     panels = figure.subplots(1, 2)
     titles = ("source, the checkerboard pulled back", "image on the torus")
-    for axes, points, title in zip(panels, (surface.V, image), titles, strict=True):
-        scene = Scene(_view(points))
+    views = (_view(surface.V), View(45.0, -60.0))
+    for axes, points, view, title in zip(panels, (surface.V, image), views, titles, strict=True):
+        scene = Scene(view)
         scene.add_faces(subdivided(points[surface.F], pieces), colours)
         scene.draw(axes)
         axes.set_title(title, fontsize=10)
@@ -485,10 +486,10 @@ def _principal(reference: Array, points: Array) -> Array:
 
 
 def _view(points: Array) -> View:
-    """From where the broad side of a shape is seen, a little from above it."""
-    thin = _frame(points)[1][2]
-    elevation = float(np.degrees(np.arcsin(np.clip(abs(thin[2]), 0.0, 1.0))))
-    return View(float(np.clip(elevation - 30.0, 20.0, 50.0)), -60.0)
+    """From where the broad side of a shape is seen, its longest axis running across."""
+    frame = _frame(points)[1]
+    frame[1] *= np.linalg.det(frame)  # a rotation, no reflection
+    return View(45.0, -70.0, frame)
 
 
 def _viridis(place: Array, reference: Array, axis: int) -> Array:
