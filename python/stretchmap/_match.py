@@ -21,6 +21,11 @@ _NO_SLOPES = np.zeros((0, 6))
 _SHORTEST = 1e-3  # steps shorter than this make no progress
 _RISE = 1.0  # energy that may be spent on one step towards the landmarks; 0 for an isometry
 _DRAG_STEPS = 60
+_SHORT = 0.02  # a step shorter than this asks for another kind of step
+_PATIENCE = 30  # stalled steps in a row that end the iteration
+# Surfaces have edges, where the energy has kinks and a few faces block the step of all others.
+# After a step that stalled, a share of the vertices drawn by lot stays put.
+_HELD = (0.0, 0.0, 0.3, 0.3, 0.6, 0.6)
 
 
 @dataclass(frozen=True)
@@ -206,6 +211,7 @@ def match_surfaces(
         report(progress, "match", len(history) - 1, max_iter, energy=energy)
 
     record(math.nan)
+    rng = np.random.default_rng(0)
     # The free optimum first: it is the best place to draw the landmarks from.
     ids = landmarks[:, 0]
     for holding in (False, True) if len(ids) else (False,):
@@ -213,19 +219,22 @@ def match_surfaces(
             problem.held[ids] = True
             goals = target.turns[landmarks[:, 1]]
             y, points, energy = _draw(problem, y, points, energy, ids, goals, record)
-        tangent, failed = False, 0
+        pinned = problem.held.copy()
+        tangent, stalled = False, 0
         for _ in range(max_iter):
+            problem.held = pinned | (rng.random(len(y)) < _HELD[stalled % len(_HELD)])
             step = problem.newton_step(y, points, tangent)
             taken, before = _search(problem, y, step, energy), energy
             if taken is not None:
                 alpha, y, points, energy = taken
                 record(alpha)
-            if taken is None or alpha < 0.02 or before - energy <= tol * before:
-                tangent, failed = not tangent, failed + 1
-                if failed == 6:
+            if taken is None or alpha < _SHORT or before - energy <= tol * before:
+                tangent, stalled = not tangent, stalled + 1
+                if stalled == _PATIENCE:
                     break
-            elif before - energy > 10.0 * tol * before:
-                failed = 0
+            else:
+                stalled = 0
+        problem.held = pinned
     return Match(y, points, tuple(history))
 
 

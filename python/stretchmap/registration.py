@@ -236,7 +236,7 @@ def register(
     landmarks: Landmarks | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
     *,
     h: str = "smooth",
-    max_iter: int = 60,
+    max_iter: int = 300,
     tol: float = 1e-3,
     keep_best: bool = False,
     solver: str = "auto",

@@ -40,7 +40,9 @@ _CORNERS = np.array(
      [4, 7, 5, 0], [5, 4, 6, 1], [6, 5, 7, 2], [7, 6, 4, 3]]
 )  # fmt: skip
 _BISECTIONS = 40
-_ROUNDS = 12
+_ROUNDS = 12  # of letting vertices go, then of drawing them back
+_ADAPT = 3  # steps of the inner points between two draws
+_HALVINGS = 40
 _SQUARE = 0.5  # half diagonal of the middle block over the radius of the section
 
 
@@ -298,30 +300,53 @@ def _repaired(
     T = _corner_tets(H)
     sizes = [_hex_volumes(p, H).sum() ** (1.0 / 3.0) for p in (grid, V)]
     centre = V.mean(axis=0)
-    x = np.ascontiguousarray((V - centre) / sizes[1])
-    held = boundary
+    goal = np.ascontiguousarray((V - centre) / sizes[1])
+
+    def solver(held: NDArray[np.int32]) -> FlipFreeSolver:
+        return FlipFreeSolver(
+            V=np.ascontiguousarray(grid / sizes[0]), T=T, boundary=held,
+            faces=np.zeros((0, 3), np.int32), R=torus.R, r=torus.r,
+            options=FlipFreeOptions(frozen_iter=_ADAPT),
+        )  # fmt: skip
+
+    x, held = goal, boundary
     for _ in range(_ROUNDS):
-        solver = FlipFreeSolver(
-            V=np.ascontiguousarray(grid / sizes[0]),
-            T=T,
-            boundary=held,
-            faces=np.zeros((0, 3), np.int32),
-            R=torus.R,
-            r=torus.r,
-            options=FlipFreeOptions(),
-        )
-        x, flips = solver.untangle(x, glide=False)
+        x, flips = solver(held).untangle(x, glide=False)
         if not flips:
             break
-        bad = T[~(_core.signed_tet_volumes(x, T) > 0.0)]
-        held = np.setdiff1d(held, bad)
+        held = np.setdiff1d(held, T[~(_core.signed_tet_volumes(x, T) > 0.0)])
     else:
         raise SolverError(
             f"{flips} corners of hexahedra could not be made positive; a finer grid may help"
         )
+    loose = np.setdiff1d(boundary, held)
+    if len(loose):
+        inner = solver(boundary)
+        for _ in range(_ROUNDS):
+            x = _drawn(x, goal, loose, T)
+            x, _, _ = inner.minimise(x, glide=False, start=1.0, goal=1.0)
     out = x * sizes[1] + centre
     out[held] = V[held]
     return out
+
+
+def _drawn(
+    x: NDArray[np.float64], goal: NDArray[np.float64], ids: NDArray[np.int32], T: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """Each of some points moved to its goal as far as the tets at it stay positive.
+
+    One share of the way for all of them, then halved for those at a tet that would turn over.
+    """
+    floor = 1e-2 * np.abs(_core.signed_tet_volumes(x, T))
+    share = np.zeros(len(x))
+    share[ids] = 1.0
+    for _ in range(_HALVINGS):
+        moved = x + share[:, None] * (goal - x)
+        bad = T[~(_core.signed_tet_volumes(moved, T) > floor)]
+        if not len(bad):
+            return moved
+        share[bad.ravel()] *= 0.5
+    return x
 
 
 def transfer(
