@@ -25,6 +25,7 @@ __all__ = ["FlipFreeOptions", "FlipFreeSolver"]
 
 _FREE, _FIXED, _GLIDING = 0, 1, 2
 _PATIENCE = 10  # untangling steps without progress before something else is tried
+_RESTARTS = 3  # of the continuation, from a large epsilon
 _NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
 
 
@@ -183,11 +184,16 @@ class FlipFreeSolver:
         clock = time.perf_counter()
         state = newton.value(x, _core.EnergyWeights(1.0, 1.0, 1.0, face))
         left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
-        fewest, since = left, 0
-        epsilon = max(0.2 * abs(worst), 10.0 * o.floor)
+        fewest, since, restarts = left, 0, 0
+        epsilon = first = max(0.2 * abs(worst), 10.0 * o.floor)
         for iteration in range(1, o.untangle_iter + 1):
-            if (left == 0 and (worst >= o.floor or since >= _PATIENCE)) or since >= 3 * _PATIENCE:
+            if left == 0 and (worst >= o.floor or since >= _PATIENCE):
                 break
+            if since >= 3 * _PATIENCE:
+                # Stuck with epsilon small: the way out is over a higher pass.
+                if not glide or restarts == _RESTARTS:
+                    break
+                restarts, since, epsilon = restarts + 1, 0, max(first, 0.1)
             weights = _core.EnergyWeights(1.0, 1.0, epsilon, face)
             x, step = newton.step(x, weights, min(o.cg_tol, 1e-2), o.max_cg)
             after = step.after

@@ -11,13 +11,15 @@ namespace stretchmap {
 using Eigen::Vector3d;
 
 struct BoundaryBarrier::State {
-  std::array<Vector3d, 3> x, normal, e_u, e_v;
+  std::array<Vector3d, 3> x, e_u, e_v;
+  std::array<Vector3d, 4> normal;
   std::array<double, 3> rho, cos_v;
   Eigen::Matrix<double, 3, 2> G;  // J = sum_i x_i G.row(i)
   Eigen::Matrix<double, 3, 2> J;
   Vector3d area;        // area vector over the rest area
   double inverse_area;  // 1 / rest area
-  Vector3d sigma;
+  Eigen::Vector4d sigma;
+  Eigen::Matrix3d turn;  // derivative of normal[3] by the centroid
 };
 
 BoundaryBarrier::BoundaryBarrier(Faces faces, Rows rest, Vec weights, double R, double r)
@@ -45,7 +47,14 @@ BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, Index f) const
   for (int k = 0; k < 3; ++k) s.J += s.x[k] * s.G.row(k);
   s.inverse_area = 2.0 * (rest_(f, 0) * rest_(f, 3) - rest_(f, 1) * rest_(f, 2));
   s.area = 0.5 * s.inverse_area * (s.x[1] - s.x[0]).cross(s.x[2] - s.x[0]);
-  for (int k = 0; k < 3; ++k) s.sigma[k] = s.area.dot(s.normal[k]);
+  const Vector3d centroid = (s.x[0] + s.x[1] + s.x[2]) / 3.0;
+  const double rho = std::hypot(centroid[0], centroid[1]);
+  const Vector3d along(-centroid[1] / rho, centroid[0] / rho, 0.0);  // e_u at the centroid
+  const Vector3d off = centroid - R_ / rho * Vector3d(centroid[0], centroid[1], 0.0);
+  s.normal[3] = off.normalized();
+  s.turn = (Eigen::Matrix3d::Identity() - s.normal[3] * s.normal[3].transpose()) / off.norm() *
+           (Eigen::Matrix3d::Identity() - R_ / rho * along * along.transpose());
+  for (int k = 0; k < 4; ++k) s.sigma[k] = s.area.dot(s.normal[k]);
   return s;
 }
 
@@ -60,7 +69,7 @@ FaceReport BoundaryBarrier::value(const PointsRef& x, Index f, double epsilon) c
   const double I = s.J.squaredNorm();
   for (const double sigma : s.sigma)
     report.energy += 0.5 * (I + sigma * sigma + 1.0) / regularised(sigma, epsilon).value - 2.0;
-  report.energy *= weights_[f] / 3.0;
+  report.energy *= 0.25 * weights_[f];
   return report;
 }
 
@@ -80,18 +89,21 @@ void BoundaryBarrier::linearise(const PointsRef& x, Index f, double epsilon,
   const Eigen::Map<const Vector6> J(s.J.data());
   const Vector6 slope = jacobian.transpose() * J;  // half the gradient of |J|^2
   const Matrix6 square = jacobian.transpose() * jacobian;
-  const double I = s.J.squaredNorm(), weight = weights_[f] / 3.0;
+  const double I = s.J.squaredNorm(), weight = 0.25 * weights_[f];
 
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 4; ++k) {
     Vector6 d;  // gradient of sigma_k
     for (int i = 0; i < 3; ++i) {
-      const Vector3d by_x =
+      Vector3d by_x =
           0.5 * s.inverse_area * (s.x[(i + 1) % 3] - s.x[(i + 2) % 3]).cross(s.normal[k]);
+      if (k == 3) by_x += s.turn.transpose() * s.area / 3.0;
       d[2 * i] = by_x.dot(s.e_u[i]);
       d[2 * i + 1] = by_x.dot(s.e_v[i]);
     }
-    d[2 * k] += s.cos_v[k] / s.rho[k] * s.area.dot(s.e_u[k]);
-    d[2 * k + 1] += s.area.dot(s.e_v[k]) / r_;
+    if (k < 3) {  // the torus' own normal turns with the corner
+      d[2 * k] += s.cos_v[k] / s.rho[k] * s.area.dot(s.e_u[k]);
+      d[2 * k + 1] += s.area.dot(s.e_v[k]) / r_;
+    }
 
     const double sigma = s.sigma[k], N = I + sigma * sigma + 1.0;
     const Regularised chi = regularised(sigma, epsilon);

@@ -1,13 +1,13 @@
 // Energy of the boundary triangles while their vertices glide on the torus.
 //
-// Let a be the area vector of the flat image triangle, N_k the torus' outward normal at its k-th
-// corner, sigma_k = a . N_k over the rest area, and J (3x2) the Jacobian from the rest triangle.
-// Then
+// Let a be the area vector of the flat image triangle, N_k the outward direction from the torus'
+// core circle at its corners (k = 0, 1, 2) and at its centroid (k = 3), sigma_k = a . N_k over the
+// rest area, and J (3x2) the Jacobian from the rest triangle. Then
 //
-//   phi = 1/3 sum_k [ |J|^2 / (2 chi_k) - 1 + (sigma_k^2 + 1) / (2 chi_k) - 1 ],
+//   phi = 1/4 sum_k [ |J|^2 / (2 chi_k) - 1 + (sigma_k^2 + 1) / (2 chi_k) - 1 ],
 //
 // with chi_k = chi(sigma_k) as in element_energy.hpp. For epsilon = 0 it is infinite as soon as a
-// triangle faces inward at one of its corners: what keeps the boundary image a graph over the
+// triangle faces inward at one of these points: what keeps the boundary image a graph over the
 // torus. The tets alone do not see such a fold. |J|^2 / chi is convex in (J, chi), so the model
 // Hessian, which drops the curvature of sigma only, is positive semi-definite without any
 // projection.
