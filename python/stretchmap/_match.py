@@ -218,7 +218,7 @@ def match_surfaces(
         if holding:
             problem.held[ids] = True
             goals = target.turns[landmarks[:, 1]]
-            y, points, energy = _draw(problem, y, points, energy, ids, goals, record)
+            y, points, energy = _draw(problem, y, points, energy, ids, goals, history)
         pinned = problem.held.copy()
         tangent, stalled = False, 0
         for _ in range(max_iter):
@@ -252,7 +252,15 @@ def _search(
     return None
 
 
-def _draw(problem, y, points, energy, ids, goals, record):  # type: ignore[no-untyped-def]
+def _draw(
+    problem: _Problem,
+    y: NDArray[np.float64],
+    points: NDArray[np.float64],
+    energy: float,
+    ids: NDArray[np.int32],
+    goals: NDArray[np.float64],
+    history: list[IterationRecord],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Move the landmarks to their goals, the rest following, as far at a time as nothing folds."""
     for _ in range(_DRAG_STEPS):
         left = goals - y[ids]
@@ -274,7 +282,11 @@ def _draw(problem, y, points, energy, ids, goals, record):  # type: ignore[no-un
         else:
             break
         y, points, energy = moved, points_there, value
-        record(alpha)
+        history.append(
+            IterationRecord(
+                stage="match", iteration=len(history), energy=energy, step=alpha, flips=0
+            )
+        )
     far = int(np.argmax(np.abs(left).max(axis=1)))
     gap = y[ids] - y[ids[far]]
     distance = np.linalg.norm(gap - np.round(gap), axis=1)

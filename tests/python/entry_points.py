@@ -130,6 +130,12 @@ ENTRIES = [
         lambda V, T: stretchmap.volume_map(TetMesh(V, T), c=0.0, max_iter=1),
     ),
     Entry(
+        "register",
+        "solid",
+        "torus",
+        lambda V, T: stretchmap.register(TetMesh(V, T), stretchmap.samples.solid_torus(400)),
+    ),
+    Entry(
         "certify a surface",
         "surface",
         "arrays",
