@@ -159,7 +159,7 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
         raise OptionError(f"a morph has at least two frames, got {frames}")
     image = np.asarray(result.image)
     if align:
-        from .registration import similarity
+        from .landmarks import similarity
 
         rotation, scale, shift = similarity(image, solid.V)
         image = scale * image @ rotation + shift

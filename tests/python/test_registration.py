@@ -17,8 +17,9 @@ from stretchmap.errors import (
     LandmarkError,
     OptionError,
 )
+from stretchmap.landmarks import Landmarks, landmarks_between, read_landmarks
 from stretchmap.mesh import TetMesh
-from stretchmap.registration import Landmarks, landmarks_between, read_landmarks, register
+from stretchmap.registration import register
 
 RNG = np.random.default_rng(8)
 

@@ -1,0 +1,212 @@
+"""Landmarks of a registration: given as vertices, points or a file, or found by a rule."""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from . import _core
+from .errors import ArrayError, FileFormatError, LandmarkError, OptionError
+from .mesh import TetMesh
+
+if TYPE_CHECKING:
+    from .registration import Registration
+
+__all__ = ["Landmarks", "landmarks_between", "read_landmarks", "similarity"]
+
+_SAME_WAY = 0.8  # least cosine between the normals of two points that are taken to correspond
+
+
+@dataclass(frozen=True, eq=False)
+class Landmarks:
+    """Pairs of boundary vertices that correspond.
+
+    Attributes
+    ----------
+    source, target : ndarray of int32, shape (k,)
+        Vertices of the two solids.
+    snapped : ndarray, shape (k, 2)
+        How far the points given were from these vertices, in source and target; zero for ids.
+    """
+
+    source: NDArray[np.int32]
+    target: NDArray[np.int32]
+    snapped: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    @classmethod
+    def of(
+        cls, source: TetMesh, target: TetMesh, source_at: ArrayLike, target_at: ArrayLike
+    ) -> Landmarks:
+        """Landmarks from vertex ids (k,) or points (k, 3), which go to the nearest boundary vertex.
+
+        Raises
+        ------
+        ArrayError
+            Wrong shapes or numbers of landmarks.
+        LandmarkError
+            A vertex that is not on the boundary or is used twice; ``ids`` are the landmarks.
+        """
+        ends = [_snap(mesh, at) for mesh, at in ((source, source_at), (target, target_at))]
+        if len(ends[0][0]) != len(ends[1][0]):
+            raise ArrayError(
+                f"{len(ends[0][0])} landmarks on the source, {len(ends[1][0])} on the target"
+            )
+        for (ids, _), name in zip(ends, ("source", "target"), strict=True):
+            _, first, count = np.unique(ids, return_index=True, return_counts=True)
+            if (count > 1).any():
+                vertex = ids[first[count > 1][0]]
+                same = np.flatnonzero(ids == vertex)
+                raise LandmarkError(
+                    f"landmarks {same[0]} and {same[1]} are the same {name} vertex {vertex}", same
+                )
+        return cls(ends[0][0], ends[1][0], np.stack([ends[0][1], ends[1][1]], axis=1))
+
+
+def _snap(mesh: TetMesh, at: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    given = np.asarray(at)
+    if given.ndim == 1 and given.dtype.kind in "iu":
+        if len(given) and not (0 <= given.min() and given.max() < mesh.n_vertices):
+            bad = np.flatnonzero((given < 0) | (given >= mesh.n_vertices))
+            raise LandmarkError(f"landmark {bad[0]} names no vertex: {given[bad[0]]}", bad)
+        inner = np.flatnonzero(mesh.boundary_index[given] < 0)
+        if len(inner):
+            raise LandmarkError(
+                f"landmark {inner[0]}: vertex {given[inner[0]]} is not on the boundary", inner
+            )
+        return given.astype(np.int32), np.zeros(len(given))
+    if given.ndim == 2 and given.shape[1] == 3 and given.dtype.kind in "fiu":
+        if not np.isfinite(given).all():
+            raise LandmarkError("a landmark is not finite")
+        distance, nearest = cKDTree(mesh.V[mesh.boundary_vertices]).query(given.astype(float))
+        return mesh.boundary_vertices[nearest], distance
+    raise ArrayError(f"landmarks are vertex ids (k,) or points (k, 3), not {given.shape}")
+
+
+def read_landmarks(path: str | os.PathLike[str], source: TetMesh, target: TetMesh) -> Landmarks:
+    """Read landmarks from a CSV file.
+
+    Parameters
+    ----------
+    path : path-like
+        One landmark per row: two vertex ids, or six coordinates (source, then target). A first row
+        that is not numbers is a header.
+    source, target : TetMesh
+
+    Raises
+    ------
+    FileFormatError
+        If the rows are not like that.
+    LandmarkError, ArrayError
+        As `Landmarks.of`.
+    OSError
+        If the file cannot be opened.
+    """
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = [[cell.strip() for cell in row] for row in csv.reader(file) if any(row)]
+
+    def numbers(row: list[str]) -> list[float] | None:
+        try:
+            return [float(cell) for cell in row]
+        except ValueError:
+            return None
+
+    if rows and numbers(rows[0]) is None:
+        rows = rows[1:]
+    table = [numbers(row) for row in rows]
+    widths = {len(row) for row in table if row is not None}
+    if None in table or not table or widths not in ({2}, {6}):
+        raise FileFormatError(
+            f"{path}: every row must hold two vertex ids or six coordinates, one landmark per row"
+        )
+    values = np.array(table, float)
+    if widths == {2}:
+        if (values != np.round(values)).any():
+            raise FileFormatError(f"{path}: vertex ids must be whole numbers")
+        return Landmarks.of(source, target, *values.T.astype(np.int64))
+    return Landmarks.of(source, target, values[:, :3], values[:, 3:])
+
+
+def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
+    """Landmarks by a geometric rule, where nobody has placed any.
+
+    The source is laid on the target by the similarity that fits the registration best. Candidates
+    are taken one by one from the source's boundary, each the farthest from those before; each goes
+    with the nearest target vertex, provided that the normals there agree (cosine above 0.8) and
+    that the way back ends within two mean edge lengths of where it began.
+
+    Parameters
+    ----------
+    registration : Registration
+        Made without landmarks.
+    n : int
+        Number of landmarks.
+
+    Raises
+    ------
+    OptionError
+        If ``n`` is not positive.
+    LandmarkError
+        If the rule finds fewer.
+    """
+    if n < 1:
+        raise OptionError(f"n must be positive, got {n}")
+    solid, target = registration.solid, registration.target
+    first, second = solid.surface, target.surface
+    image = registration.image[solid.boundary_vertices]
+    rotation, scale, shift = similarity(first.V, image)
+    moved = scale * first.V @ rotation + shift
+    there, back = cKDTree(second.V), cKDTree(moved)
+    _, partner = there.query(moved)
+    normals = _vertex_normals(first.V, first.F) @ rotation
+    agree = np.einsum("ij,ij->i", normals, _vertex_normals(second.V, second.F)[partner])
+    _, home = back.query(second.V[partner])
+    edge = np.linalg.norm(np.diff(moved[first.edges], axis=1), axis=2).mean()
+    usable = (agree > _SAME_WAY) & (np.linalg.norm(moved[home] - moved, axis=1) < 2.0 * edge)
+    chosen: list[int] = []
+    nearest = np.where(usable, np.linalg.norm(moved - moved.mean(axis=0), axis=1), -1.0)
+    while len(chosen) < n and nearest.max() > 0.0:
+        i = int(np.argmax(nearest))
+        if partner[i] in partner[chosen]:
+            nearest[i] = -1.0
+            continue
+        chosen.append(i)
+        distance = np.linalg.norm(moved - moved[i], axis=1)
+        nearest = np.minimum(nearest, distance) if len(chosen) > 1 else distance
+        nearest[~usable] = -1.0
+    if len(chosen) < n:
+        raise LandmarkError(f"the rule finds {len(chosen)} landmarks, {n} were asked for")
+    return Landmarks.of(
+        solid,
+        target,
+        solid.boundary_vertices[chosen],
+        target.boundary_vertices[partner[chosen]],
+    )
+
+
+def similarity(
+    points: NDArray[np.float64], images: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    """Rotation, scale, shift with ``scale * points @ rotation + shift`` nearest to the images."""
+    p, q = points - points.mean(axis=0), images - images.mean(axis=0)
+    U, S, W = np.linalg.svd(p.T @ q)
+    S[2] *= np.sign(np.linalg.det(U @ W))
+    U[:, 2] *= np.sign(np.linalg.det(U @ W))
+    scale = float(S.sum() / (p**2).sum())
+    rotation = U @ W
+    return rotation, scale, images.mean(axis=0) - scale * points.mean(axis=0) @ rotation
+
+
+def _vertex_normals(V: NDArray[np.float64], F: NDArray[np.int32]) -> NDArray[np.float64]:
+    face = _core.face_area_vectors(V, F)
+    sums = [np.bincount(F.ravel(), np.repeat(c, 3), minlength=len(V)) for c in face.T]
+    normals = np.stack(sums, axis=1)
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
