@@ -98,15 +98,17 @@ void bind_volume(py::module_& m) {
           py::arg("x").noconvert(), py::arg("weights"), release_gil())
       .def(
           "step",
-          [](SolidNewton& self, Points x, const EnergyWeights& w, double tol, int max_cg) {
+          [](SolidNewton& self, Points x, const EnergyWeights& w, double tol, int max_cg,
+             bool keep_hessian) {
             NewtonOptions options;
+            options.keep_hessian = keep_hessian;
             options.tol = tol;
             options.max_cg = max_cg;
             const NewtonReport report = self.step(x, w, options, signal_poll());
             return std::make_pair(std::move(x), report);
           },
           py::arg("x"), py::arg("weights"), py::arg("tol") = 1e-2, py::arg("max_cg") = 300,
-          release_gil());
+          py::arg("keep_hessian") = false, release_gil());
 
   py::class_<RingStep>(m, "RingStep")
       .def_readonly("x", &RingStep::x)

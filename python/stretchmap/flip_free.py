@@ -56,6 +56,8 @@ class FlipFreeOptions:
         the boundary held the decrease is slower from the beginning.
     exact_sd_factor : float
         `FlipFreeSolver.make_rings_exact` may raise the SD of the tet ratios by this factor.
+    shared : int
+        Most steps in a row that share one Hessian; 1 renews it at every step.
     cg_tol, max_cg
         Relative residual and most iterations of the linear solves.
     """
@@ -72,6 +74,7 @@ class FlipFreeOptions:
     glide_tol: float = 2e-3
     frozen_tol: float = 5e-4
     exact_sd_factor: float = 1.25
+    shared: int = 5
     cg_tol: float = 0.1
     max_cg: int = 200
 
@@ -222,12 +225,14 @@ class FlipFreeSolver:
         face = o.face_weight if glide else 0.0
         newton = self._newton(x, _GLIDING if glide else _FIXED)
         clock = time.perf_counter()
-        weight = start
+        weight, kept = start, 0
         for iteration in range(1, total + 1):
             weights = _core.EnergyWeights(1.0, weight, 0.0, face)
-            x, step = newton.step(x, weights, o.cg_tol, o.max_cg)
+            x, step = newton.step(x, weights, o.cg_tol, o.max_cg, kept > 0)
             before, after = step.before.energy / weight, step.after.energy / weight
             self._record(stage, iteration, x, after, step.alpha, step.decrement, clock, total)
+            # At the last weight the Hessian changes little: a few steps share one.
+            kept = (kept + 1) % o.shared if weight == goal and step.alpha >= 0.5 else 0
             if weight < goal:
                 if step.alpha >= 0.5:
                     weight = min(goal, o.growth * weight)

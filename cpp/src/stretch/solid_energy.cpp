@@ -226,14 +226,19 @@ void SolidEnergy::add_element(const PointsRef& x, const EnergyWeights& w, Index 
                               Index last, Points& gradient, double* blocks) const {
   Matrix3d P;
   Matrix9 H;
-  element_energy(jacobian(x, t), w, P, &H);
+  element_energy(jacobian(x, t), w, P, blocks ? &H : nullptr);
   P *= weights_[t];
-  H *= weights_[t];
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rest(rest_.row(t).data());
   Eigen::Matrix<double, 4, 3> G;  // derivative of J's columns by the vertices
   G.bottomRows<3>() = rest;
   G.row(0) = -G.bottomRows<3>().colwise().sum();
+  for (int a = 0; a < 4; ++a) {
+    const Index row = vertex_row_[tets_(t, a)];
+    if (row >= first && row < last) gradient.row(row) += (P * G.row(a).transpose()).transpose();
+  }
+  if (!blocks) return;
 
+  H *= weights_[t];
   std::array<Eigen::Matrix<double, 9, 3>, 4> half;  // H contracted with G on the right
   for (int b = 1; b < 4; ++b)
     half[b] =
@@ -242,7 +247,6 @@ void SolidEnergy::add_element(const PointsRef& x, const EnergyWeights& w, Index 
   for (int a = 0; a < 4; ++a) {
     const Index row = vertex_row_[tets_(t, a)];
     if (row < first || row >= last) continue;
-    gradient.row(row) += (P * G.row(a).transpose()).transpose();
     for (int b = 0; b < 4; ++b) {
       const Index at = slot_(t, 4 * a + b);
       if (at < 0) continue;
@@ -254,24 +258,28 @@ void SolidEnergy::add_element(const PointsRef& x, const EnergyWeights& w, Index 
 }
 
 void SolidEnergy::linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
-                            BlockMatrix& hessian) {
+                            BlockMatrix* hessian) const {
   gradient.setZero(rows(), 3);
-  hessian.values.setZero();
+  double* blocks = nullptr;
+  if (hessian) {
+    hessian->values.setZero();
+    blocks = hessian->values.data();
+  }
   const Index parts = static_cast<Index>(part_tets_.size());
 #pragma omp parallel for schedule(static, 1)
   for (Index p = 0; p < parts; ++p) {
     for (const Index t : part_tets_[p])
-      add_element(x, w, t, part_row_[p], part_row_[p + 1], gradient, hessian.values.data());
+      add_element(x, w, t, part_row_[p], part_row_[p + 1], gradient, blocks);
   }
   if ((motion_.array() != kGliding).all()) return;
   const Index n_rows = rows();
 #pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row) into_frames(x, row, gradient, hessian.values.data());
+  for (Index row = 0; row < n_rows; ++row) into_frames(x, row, gradient, blocks);
   if (w.face <= 0.0) return;
 #pragma omp parallel for schedule(static, 1)
   for (Index p = 0; p < parts; ++p) {
     for (const Index f : part_faces_[p])
-      add_face(x, w, f, part_row_[p], part_row_[p + 1], gradient, hessian.values.data());
+      add_face(x, w, f, part_row_[p], part_row_[p + 1], gradient, blocks);
   }
 }
 
@@ -285,7 +293,7 @@ void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, 
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;
     gradient.row(row).head<2>() += w.face * g.segment<2>(2 * a).transpose();
-    for (int b = 0; b < 3; ++b) {
+    for (int b = 0; blocks && b < 3; ++b) {
       const Index at = find_block(row, vertex_row_[barrier_.faces()(f, b)]);
       Block(blocks + 9 * static_cast<std::ptrdiff_t>(at)).topLeftCorner<2, 2>() +=
           w.face * H.block<2, 2>(2 * a, 2 * b);
@@ -315,7 +323,7 @@ void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
   const Matrix3d Q = frame(x, vertex);
   const bool gliding = motion_[vertex] == kGliding;
   const Vector3d g = Q.transpose() * gradient.row(row).transpose();
-  for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p) {
+  for (Index p = row_ptr_[row]; blocks && p < row_ptr_[row + 1]; ++p) {
     const Index other = row_vertex_[col_[p]];
     if (!gliding && motion_[other] != kGliding) continue;
     Block block(blocks + 9 * static_cast<std::ptrdiff_t>(p));

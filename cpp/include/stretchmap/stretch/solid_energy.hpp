@@ -44,10 +44,10 @@ class SolidEnergy {
 
   EnergyReport value(const PointsRef& x, const EnergyWeights& w) const;
 
-  // Gradient (rows, 3) and Hessian, both in vertex frames.
+  // Gradient (rows, 3) and, unless null, Hessian, both in vertex frames.
   // \pre value(x, w).energy is finite.
   void linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
-                 BlockMatrix& hessian);
+                 BlockMatrix* hessian) const;
 
   // x moved by alpha * step (rows, 3); gliding vertices stay on the torus.
   Points move(const PointsRef& x, const PointsRef& step, double alpha) const;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "stretchmap/stretch/solid_energy.hpp"
 
@@ -12,6 +13,10 @@ struct NewtonOptions {
   int max_cg = 300;      // more are not spent on one step
   double armijo = 1e-4;  // demanded share of the predicted decrease
   int max_halvings = 20;
+  // Keep the Hessian of the last step that was asked to renew it, and correct it by the changes of
+  // the gradient since (limited-memory BFGS): several times cheaper, nearly as good while the
+  // weights stay the same.
+  bool keep_hessian = false;
 };
 
 struct NewtonReport {
@@ -40,8 +45,19 @@ class SolidNewton {
   void try_double_step(Points& x, const Points& start, const Points& direction,
                        const EnergyWeights& w, NewtonReport& report) const;
 
+  struct Change {
+    Vec step, gradient;
+    double inverse;  // 1 / (step . gradient)
+  };
+
+  void renew(const PointsRef& x, const EnergyWeights& w, bool keep);
+  Points descend(const NewtonOptions& options, const Poll& poll, NewtonReport& report);
+
   SolidEnergy energy_;
   std::unique_ptr<BlockSolver> solver_;
+  Points gradient_;                // at the current point
+  Vec last_gradient_, last_step_;  // before the last step, and the step; empty after a renewal
+  std::vector<Change> changes_;    // since the Hessian was renewed
 };
 
 }  // namespace stretchmap
