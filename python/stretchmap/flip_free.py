@@ -231,18 +231,21 @@ class FlipFreeSolver:
             x, step = newton.step(x, weights, o.cg_tol, o.max_cg, kept > 0)
             before, after = step.before.energy / weight, step.after.energy / weight
             self._record(stage, iteration, x, after, step.alpha, step.decrement, clock, total)
-            # At the last weight the Hessian changes little: a few steps share one.
-            kept = (kept + 1) % o.shared if weight == goal and step.alpha >= 0.5 else 0
+            small = before - after <= (o.glide_tol if glide else o.frozen_tol) * before
             if weight < goal:
                 if step.alpha >= 0.5:
                     weight = min(goal, o.growth * weight)
                 elif step.alpha == 0.0:
                     return x, False, f"no step lowers the energy at lambda = {weight:g}"
-            elif before - after <= (o.glide_tol if glide else o.frozen_tol) * before:
+            elif goal < o.volume_weight:
+                return x, True, "goal reached"  # only a start for the next stage
+            elif small and kept == 0:
                 return x, True, "the energy stopped decreasing"
-        if weight < goal:
-            return x, False, "most iterations done"
-        return x, goal < o.volume_weight, "most iterations done"
+            else:
+                # At the last weight the Hessian changes little: a few steps share one, as long as
+                # it serves. Whether to stop is for a renewed one to say.
+                kept = 0 if small or step.alpha < 0.5 else (kept + 1) % o.shared
+        return x, False, "most iterations done"
 
     def make_rings_exact(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool, str]:
         """Make the ring volume of every interior vertex exact, if that costs little.
