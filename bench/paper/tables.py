@@ -1,0 +1,165 @@
+"""One function per table: our figures beside the paper's, as rows of cells."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Any
+
+import published
+
+import stretchmap as sm
+from stretchmap.mesh import TetMesh
+
+Rows = Iterator[tuple[Any, ...]]
+Meshes = dict[str, TetMesh]
+
+
+def table_3_1(meshes: Meshes) -> Rows:
+    """Loop lengths; the paper's unit is not stated, so the ratio of the two is compared."""
+    yield ("mesh", "handle", "tunnel", "ratio", "paper's ratio", "s", "paper s")
+    for name, solid in meshes.items():
+        start = time.perf_counter()
+        basis = sm.homology_basis(solid.surface)
+        handle, tunnel = (basis.length(basis.handle_loops[0]), basis.length(basis.tunnel_loops[0]))
+        seconds = time.perf_counter() - start
+        short, long = sorted((handle, tunnel))
+        paper = published.LOOPS.get(name)
+        yield (
+            name, f"{handle:.4g}", f"{tunnel:.4g}", f"{long / short:.3f}",
+            f"{paper[1] / paper[0]:.3f}" if paper else "-", f"{seconds:.2f}",
+            f"{paper[2]}" if paper else "-",
+        )  # fmt: skip
+
+
+def table_6_1(meshes: Meshes) -> Rows:
+    """Conformal energy (6.1) for a surface of area one."""
+    yield ("mesh", "E_C", "paper E_C", "s", "paper s")
+    for name, solid in meshes.items():
+        start = time.perf_counter()
+        result = sm.conformal_map(solid.surface)
+        seconds = time.perf_counter() - start
+        energy = result.conformal_energy
+        paper = published.CONFORMAL.get(name, ("-", "-"))
+        yield (name, f"{energy:.4e}", paper[0], f"{seconds:.2f}", paper[1])
+
+
+def table_6_2(meshes: Meshes) -> Rows:
+    """Area-preserving maps, measured on the polyhedral image."""
+    yield (
+        "mesh", "D_area", "paper", "ring mean", "paper", "ring SD", "paper", "face SD", "face min",
+        "face max", "flips", "paper", "angle mean", "s",
+    )  # fmt: skip
+    for name, solid in meshes.items():
+        start = time.perf_counter()
+        d = sm.area_map(solid.surface).distortion
+        seconds = time.perf_counter() - start
+        paper = published.AREA.get(name, ("-",) * 4)
+        yield (
+            name, f"{d.total_distortion:.4f}", paper[0], f"{d.ring_mean:.4f}", paper[1],
+            f"{d.ring_sd:.4f}", paper[2], f"{d.element_sd:.4f}", f"{d.ratio_min:.3f}",
+            f"{d.ratio_max:.3f}", d.flips, paper[3], f"{d.angle_mean:.2f}", f"{seconds:.2f}",
+        )  # fmt: skip
+
+
+def table_6_3(meshes: Meshes) -> Rows:
+    """Algorithm 5.1, 20 steps, by c."""
+    yield (
+        "mesh", "c", "D_volume", "paper", "ring mean", "paper", "ring SD", "paper", "flips",
+        "paper", "energy fell at every step", "s", "paper s",
+    )  # fmt: skip
+    for name, solid in meshes.items():
+        boundary = sm.area_map(solid.surface)
+        for c in (0, 1, 10):
+            result = sm.volume_map(solid, c=c, max_iter=20, tol=0.0, boundary_map=boundary)
+            d, energies = result.distortion, [record.energy for record in result.history]
+            falls = all(b < a for a, b in pairwise(energies))
+            paper = published.VOLUME.get(name, {}).get(c, ("-",) * 5)
+            yield (
+                name, c, f"{d.total_distortion:.4f}", paper[0], f"{d.ring_mean:.4f}", paper[1],
+                f"{d.ring_sd:.4f}", paper[2], d.flips, paper[3], "yes" if falls else "NO",
+                f"{result.seconds['vsem']:.2f}", paper[4],
+            )  # fmt: skip
+
+
+def table_6_4(meshes: Meshes) -> Rows:
+    """Algorithm 5.1 with c = 10 after 0, 1, 5, 10 and 20 steps."""
+    yield ("mesh", "steps", "energy", "D_volume", "paper", "ring SD", "paper", "flips", "paper")
+    for name, solid in meshes.items():
+        boundary = sm.area_map(solid.surface)
+        for steps in (0, 1, 5, 10, 20):
+            result = sm.volume_map(solid, c=10, max_iter=steps, tol=0.0, boundary_map=boundary)
+            d = result.distortion
+            paper = published.STEPS.get(name, {}).get(steps, ("-",) * 4)
+            yield (
+                name, steps, f"{result.history[-1].energy:.4f}", f"{d.total_distortion:.4f}",
+                paper[0], f"{d.ring_sd:.4f}", paper[2], d.flips, paper[3],
+            )  # fmt: skip
+
+
+def certified(meshes: Meshes) -> Rows:
+    """The paper's two columns, ours by its algorithm, and the certified maps."""
+    yield (
+        "mesh", "method", "flips", "certified", "ring SD", "D_volume", "tet mean abs(ratio-1)",
+        "tet SD", "min ratio", "angle mean", "steps", "s",
+    )  # fmt: skip
+    for name, solid in meshes.items():
+        for c in (0, 10):
+            paper = published.VOLUME.get(name, {}).get(c)
+            if paper:
+                cells = ("-",) * 4
+                yield (
+                    name,
+                    f"paper, c = {c}",
+                    paper[3],
+                    "-",
+                    paper[2],
+                    paper[0],
+                    *cells,
+                    20,
+                    paper[4],
+                )
+        runs: dict[str, dict[str, Any]] = {
+            "vsem, c = 0": {"c": 0, "max_iter": 20, "tol": 0.0},
+            "vsem, c = 10": {"c": 10, "max_iter": 20, "tol": 0.0},
+            "frozen": {"boundary": "frozen", "keep_best": True},
+            "glide": {"boundary": "glide", "keep_best": True},
+        }
+        for method, options in runs.items():
+            start = time.perf_counter()
+            result = sm.volume_map(solid, **options)
+            yield (name, method, *map_cells(result), f"{time.perf_counter() - start:.1f}")
+
+
+def map_cells(result: sm.volume.VolumeMap) -> tuple[Any, ...]:
+    """Flips, certificate, distortion and steps of a volume map."""
+    d = result.distortion
+    return (
+        d.flips, "yes" if result.certificate.certified else "no", f"{d.ring_sd:.4f}",
+        f"{d.total_distortion:.4f}", f"{d.element_mad:.4f}", f"{d.element_abs_sd:.4f}",
+        f"{d.ratio_min:.3f}", f"{d.angle_mean:.2f}",
+        sum(1 for record in result.history if record.iteration > 0),
+    )  # fmt: skip
+
+
+def all_solids(meshes: Meshes) -> Rows:
+    """The default map of every mesh given."""
+    yield (
+        "mesh", "tets", "flips", "certified", "ring SD", "D_volume", "tet mean abs(ratio-1)",
+        "tet SD", "min ratio", "angle mean", "steps", "s",
+    )  # fmt: skip
+    for name, solid in meshes.items():
+        start = time.perf_counter()
+        result = sm.volume_map(solid, keep_best=True)
+        yield (name, len(solid.T), *map_cells(result), f"{time.perf_counter() - start:.1f}")
+
+
+TABLES: dict[str, tuple[str, Callable[[Meshes], Rows]]] = {
+    "3.1": ("Table 3.1: loops", table_3_1),
+    "6.1": ("Table 6.1: conformal maps", table_6_1),
+    "6.2": ("Table 6.2: area-preserving maps", table_6_2),
+    "6.3": ("Table 6.3: Algorithm 5.1 by c", table_6_3),
+    "6.4": ("Table 6.4: Algorithm 5.1 by steps", table_6_4),
+    "certified": ("Certified maps", certified),
+}
