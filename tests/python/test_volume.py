@@ -144,6 +144,16 @@ def test_vsem_energy_falls_at_every_step_and_flips_are_reported(bumpy):
     assert not result.converged and result.stop_reason == "most iterations done"
 
 
+def test_a_large_run_says_how_much_memory_it_needs(bumpy, caplog, monkeypatch):
+    caplog.set_level("INFO", "stretchmap")
+    sm.volume_map(bumpy, c=10.0, max_iter=0)
+    assert "memory" not in caplog.text
+    monkeypatch.setattr("stretchmap.volume._LARGE", len(bumpy.T) - 1)
+    monkeypatch.setattr("stretchmap.volume._BYTES_PER_TET", {"vsem": 2**30 / len(bumpy.T)})
+    sm.volume_map(bumpy, c=10.0, max_iter=0)
+    assert f"{len(bumpy.T)} tets, method vsem: about 1.0 GiB" in caplog.text
+
+
 def test_solvers_agree(bumpy):
     images = [
         sm.volume_map(bumpy, c=10.0, max_iter=5, solver=solver).image
