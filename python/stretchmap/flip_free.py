@@ -9,6 +9,7 @@ in a step nor when lambda grows.
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from dataclasses import dataclass, field
@@ -17,15 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
+from ._marginals import Marginals
 from .errors import SolverError
 from .progress import Progress, report
 from .results import IterationRecord
+from .torus import Torus
 
 __all__ = ["FlipFreeOptions", "FlipFreeSolver"]
+
+_log = logging.getLogger("stretchmap")
 
 _FREE, _FIXED, _GLIDING = 0, 1, 2
 _PATIENCE = 10  # untangling steps without progress before something else is tried
 _RESTARTS = 3  # of the continuation, from a large epsilon
+_SWEEPS = 4  # over the coordinates; the first does most, the others the layer at the boundary
 _NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
 
 
@@ -246,6 +252,33 @@ class FlipFreeSolver:
                 # it serves. Whether to stop is for a renewed one to say.
                 kept = 0 if small or step.alpha < 0.5 else (kept + 1) % o.shared
         return x, False, "most iterations done"
+
+    def equalise(self, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.float64]:
+        """Make the marginals of the volume exact, see `Marginals`.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            ``x`` itself if a tet would turn over.
+        """
+        marginals = Marginals(
+            self.T, self._shares, self.boundary, Torus(self.R, self.r), held=not glide
+        )
+        clock = time.perf_counter()
+        moved = x
+        for iteration in range(1, _SWEEPS + 1):
+            start = moved
+            moved, error = marginals.equalise(start)
+            change = float(np.linalg.norm(moved - start, axis=1).max())
+            self._record("equalise", iteration, moved, error, 1.0, change, clock, _SWEEPS)
+            if self.history[-1].flips:
+                _log.warning(
+                    "volumes along u, v and s left as they were: to make them exact would turn %d "
+                    "tets over",
+                    self.history[-1].flips,
+                )
+                return x
+        return moved
 
     def make_rings_exact(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool, str]:
         """Make the ring volume of every interior vertex exact, if that costs little.

@@ -65,7 +65,10 @@ class VolumeMap(MapResult):
     refinement : Refinement or None
         How ``solid`` came from the input, if it was refined.
     history : tuple of IterationRecord
-        Stages ``"vsem"``, ``"untangle"``, ``"frozen"``, ``"glide"``, in that order.
+        Stages ``"vsem"``, ``"untangle"``, ``"frozen"``, ``"glide"``, ``"equalise"``, ``"exact"``,
+        in that order. ``energy`` is the stretch energy in the first, the distortion energy in the
+        next three, the largest error of a marginal volume in ``"equalise"`` and the largest error
+        of a ring volume in ``"exact"``.
     distortion : Distortion
     certificate : Certificate
         Whether the map is proven to be a bijection, computed independently of the optimisation.
@@ -137,7 +140,9 @@ def volume_map(
     solid : TetMesh
         A solid torus.
     method : {"certified", "vsem"}, optional
-        ``"certified"``: a bijection with the least volume distortion, proven by a certificate.
+        ``"certified"``: a bijection with the least volume distortion, proven by a certificate; in
+        the end the volumes between level surfaces of u, v and s (with a frozen boundary: of s) are
+        made equal to those of the source.
         ``"vsem"``: Algorithm 5.1 as it stands in the paper; may leave flipped tets, which are
         reported. Default: ``"vsem"`` if ``c`` is given, else ``"certified"``.
     boundary : {"glide", "frozen"}, optional
@@ -437,6 +442,14 @@ def _certified_map(
             )
             seconds["glide"] = time.perf_counter() - clock
     exact = False
+    if flips == 0:
+        clock = time.perf_counter()
+        equalised = flip_free.equalise(x, glide=glide)
+        if certify(solid, equalised, problem.torus).certified:
+            x = equalised
+        else:
+            _log.warning("volumes along u, v and s left as they were: the boundary would fold")
+        seconds["equalise"] = time.perf_counter() - clock
     if flips == 0 and vertex_exact:
         clock = time.perf_counter()
         x, exact, reason = flip_free.make_rings_exact(x)
