@@ -1,5 +1,6 @@
 #include "arrays.hpp"
 #include "stretchmap/distortion/element_measures.hpp"
+#include "stretchmap/distortion/level_histogram.hpp"
 
 namespace stretchmap::bindings {
 
@@ -17,6 +18,9 @@ void bind_distortion(py::module_& m) {
         py::arg("image").noconvert(), release_gil());
   m.def("ring_sums", &ring_sums, py::arg("elements").noconvert(), py::arg("values").noconvert(),
         py::arg("n_vertices"), release_gil());
+  m.def("level_histogram", &level_histogram, py::arg("tets").noconvert(),
+        py::arg("values").noconvert(), py::arg("amounts").noconvert(), py::arg("bins"),
+        py::arg("period"), py::arg("periodic"), release_gil());
 }
 
 }  // namespace stretchmap::bindings

@@ -9,7 +9,6 @@ volume. The functions are within a few thousandths of the identity, the torus is
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +21,6 @@ from .torus import TWO_PI, Torus
 __all__ = ["Marginals"]
 
 _BINS = (8, 64)
-# Quadrature of degree 2: every tet counts as four points, each with a quarter of its volume.
-_NEAR, _FAR = (5.0 + 3.0 * math.sqrt(5.0)) / 20.0, (5.0 - math.sqrt(5.0)) / 20.0
-_QUADRATURE = np.full((4, 4), _FAR) + (_NEAR - _FAR) * np.eye(4)
 
 
 @dataclass(frozen=True)
@@ -75,12 +71,13 @@ class Marginals:
         error = 0.0
         for axis in "s" if self.held else "suv":
             u, v, s = self.torus.coordinates(x)
-            level = np.minimum((s / self.torus.r) ** 2, 1.0)
+            level = (s / self.torus.r) ** 2
             level[self.boundary] = 1.0
             volumes = _core.signed_tet_volumes(x, self.T)
             if axis == "s":
                 missing = self._missing(level, 1.0, volumes)
-                level = np.clip(level + missing(level), 0.0, 1.0)
+                # A chord of the torus can leave it, and a vertex near the chord with it.
+                level = level + np.where(level < 1.0, missing(level), 0.0)
             elif axis == "u":
                 missing = self._missing(u, TWO_PI, volumes)
                 u = u + TWO_PI * missing(u)
@@ -89,7 +86,7 @@ class Marginals:
                 # Volume per angle of a sector of the solid torus, relative to the mean.
                 v = v + TWO_PI * missing(v) / (1.0 + np.cos(v) / (1.5 * self.torus.ratio))
             error = max(error, float(np.abs(missing.c[-1]).max()))
-            moved = self.torus.xi(u, v, self.torus.r * np.sqrt(level))
+            moved = self.torus.xi(u, v, self.torus.r * np.sqrt(np.maximum(level, 0.0)))
             if self.held:
                 moved[self.boundary] = x[self.boundary]
             x = moved
@@ -100,17 +97,12 @@ class Marginals:
     ) -> PchipInterpolator:
         """Source minus image volume below a level, as a function of the level."""
         angle = period == TWO_PI
-        points = value[self.T]
-        if angle:
-            points = points[:, :1] + (points - points[:, :1] + math.pi) % TWO_PI - math.pi
-        points = points @ _QUADRATURE
-        if angle:
-            points %= TWO_PI
         bins = self.bins
-        index = np.minimum((points * (bins / period)).astype(np.intp), bins - 1).ravel()
         excess = self.shares - volumes / volumes.sum()
         missing = np.zeros(bins + 1)
-        missing[1:-1] = np.cumsum(np.bincount(index, np.repeat(0.25 * excess, 4), bins))[:-1]
+        missing[1:-1] = np.cumsum(
+            _core.level_histogram(self.T, value, excess, bins, period, angle)
+        )[:-1]
         levels = np.linspace(0.0, period, bins + 1)
         if not angle:
             return PchipInterpolator(levels, missing)

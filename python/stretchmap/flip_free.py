@@ -31,7 +31,7 @@ _log = logging.getLogger("stretchmap")
 _FREE, _FIXED, _GLIDING = 0, 1, 2
 _PATIENCE = 10  # untangling steps without progress before something else is tried
 _RESTARTS = 3  # of the continuation, from a large epsilon
-_SWEEPS = 4  # over the coordinates; the first does most, the others the layer at the boundary
+_SWEEPS = 12  # over the coordinates; the first does most, the others the layer at the boundary
 _NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
 
 
@@ -259,26 +259,25 @@ class FlipFreeSolver:
         Returns
         -------
         ndarray, shape (n, 3)
-            ``x`` itself if a tet would turn over.
+            Less far than usual, which is logged, if a tet would turn over.
         """
         marginals = Marginals(
             self.T, self._shares, self.boundary, Torus(self.R, self.r), held=not glide
         )
         clock = time.perf_counter()
-        moved = x
         for iteration in range(1, _SWEEPS + 1):
-            start = moved
-            moved, error = marginals.equalise(start)
-            change = float(np.linalg.norm(moved - start, axis=1).max())
+            moved, error = marginals.equalise(x)
+            change = float(np.linalg.norm(moved - x, axis=1).max())
             self._record("equalise", iteration, moved, error, 1.0, change, clock, _SWEEPS)
             if self.history[-1].flips:
                 _log.warning(
-                    "volumes along u, v and s left as they were: to make them exact would turn %d "
-                    "tets over",
-                    self.history[-1].flips,
+                    "volumes along u, v and s are equal to %.2g only: more would turn %d tets over",
+                    error,
+                    self.history.pop().flips,
                 )
-                return x
-        return moved
+                break
+            x = moved
+        return x
 
     def make_rings_exact(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool, str]:
         """Make the ring volume of every interior vertex exact, if that costs little.
