@@ -14,16 +14,16 @@ from stretchmap.samples import vertebra_like
 solid = vertebra_like(12_000)
 result = sm.volume_map(solid)
 points = result.solid.V[result.solid.T].mean(axis=1)
-u, v, s = sm.torus_coordinates(result, points).T
+u, v, s = result.coordinates(points).T
 print(f"{len(points)} points: s / r from {s.min() / result.torus.r:.3f} to "
       f"{s.max() / result.torus.r:.3f}")  # fmt: skip
 
-there = sm.forward(result, points)
-back = sm.inverse(result, there)
+there = result.forward(points)
+back = result.inverse(there)
 size = np.linalg.norm(np.ptp(solid.V, axis=0))
 print(f"there and back: {np.abs(back - points).max() / size:.1e} of the size")
 assert np.abs(back - points).max() < 1e-9 * size
-assert np.isnan(sm.forward(result, [[1e3, 0.0, 0.0]])).all()  # outside: told, not guessed
+assert np.isnan(result.forward([[1e3, 0.0, 0.0]])).all()  # outside: told, not guessed
 
 grid = hex_mesh(result, sections=48)
 print(grid.summary())

@@ -7,7 +7,8 @@ back by finding the image tet; both directions use the barycentric coordinates t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +18,10 @@ from ._arrays import as_points, read_only
 from .errors import ArrayError, OptionError
 
 if TYPE_CHECKING:
-    from .results import MapResult
+    from .mesh import TetMesh, TriMesh
+    from .torus import Torus
 
-__all__ = ["Located", "PointMap", "forward", "inverse", "torus_coordinates"]
+__all__ = ["CarriesPoints", "Located", "PointMap"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,7 @@ class PointMap:
     Parameters
     ----------
     result : VolumeMap, Registration, LoadedMap or any map result of a solid
+        Its own ``point_map`` has the default tolerance.
     tolerance : float
         A point of the boundary counts as inside if it lies no farther than this outside, as a share
         of the diagonal of the bounding box. Its image is extrapolated from the nearest tet at hand,
@@ -86,7 +89,7 @@ class PointMap:
     outside it by the height of the chord, far more than the tolerance.
     """
 
-    def __init__(self, result: MapResult, tolerance: float = 1e-9) -> None:
+    def __init__(self, result: CarriesPoints, tolerance: float = 1e-9) -> None:
         if not hasattr(result.mesh, "T"):
             raise ArrayError("points are carried by maps of solids; this is the map of a surface")
         if not (tolerance >= 0.0 and np.isfinite(tolerance)):
@@ -95,6 +98,10 @@ class PointMap:
         self._ends = (result.mesh.V, np.ascontiguousarray(result.image))
         self._tolerance = tolerance
         self._locators: list[_core.TetLocator | None] = [None, None]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the search structures, which are built anew where they are needed."""
+        return {**self.__dict__, "_locators": [None, None]}
 
     def forward(self, points: ArrayLike) -> Located:
         """Carry points of the source to the image.
@@ -137,58 +144,68 @@ class PointMap:
         )
 
 
-def forward(result: MapResult, points: ArrayLike) -> NDArray[np.float64]:
-    """Carry points of the source through a map.
+class CarriesPoints:
+    """What every map of a solid does with points; mixed into `MapResult`."""
 
-    Parameters
-    ----------
-    result : VolumeMap, Registration, LoadedMap or any map result of a solid
-    points : array_like, shape (n, 3)
+    if TYPE_CHECKING:
+        mesh: TriMesh | TetMesh
+        image: NDArray[np.float64]
+        torus: Torus | None
 
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        NaN for points outside the source. `PointMap` keeps the search structure and says more.
+    @cached_property
+    def point_map(self) -> PointMap:
+        """The map as a function of points, which also says what lies outside and in which tet."""
+        return PointMap(self)
 
-    Raises
-    ------
-    ArrayError, NonFiniteError
-        As `PointMap`.
-    """
-    return PointMap(result).forward(points).points
+    def forward(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Carry points of the source solid through the map.
 
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
 
-def inverse(result: MapResult, points: ArrayLike) -> NDArray[np.float64]:
-    """Carry points of the image back to the source; as `forward`."""
-    return PointMap(result).inverse(points).points
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            NaN for points outside the source; ``point_map.forward`` says more.
 
+        Raises
+        ------
+        ArrayError
+            If ``points`` does not have that shape, or the map is that of a surface.
+        NonFiniteError
+            If a coordinate is NaN or infinite.
+        """
+        return self.point_map.forward(points).points
 
-def torus_coordinates(result: MapResult, points: ArrayLike | None = None) -> NDArray[np.float64]:
-    """Solid-torus coordinates (u, v, s) of (7.1).
+    def inverse(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Carry points of the image back to the source solid; as `forward`."""
+        return self.point_map.inverse(points).points
 
-    Parameters
-    ----------
-    result : VolumeMap or LoadedMap
-        Map of a solid onto the solid torus.
-    points : array_like, shape (n, 3), optional
-        Points of the source; its vertices if left out.
+    def coordinates(self, points: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Solid-torus coordinates (u, v, s) of (7.1).
 
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Angles u, v in [0, 2 pi) and the distance s from the centre circle; NaN for points outside.
+        Parameters
+        ----------
+        points : array_like, shape (n, 3), optional
+            Points of the source; its vertices if left out.
 
-    Raises
-    ------
-    OptionError
-        If the map has no torus.
-    ArrayError, NonFiniteError
-        As `PointMap`.
-    """
-    if result.torus is None:
-        raise OptionError("the map has no torus, so there are no coordinates on it")
-    image = result.image if points is None else forward(result, points)
-    return read_only(np.stack(result.torus.coordinates(image), axis=-1))
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Angles u, v in [0, 2 pi) and the distance s from the centre circle; NaN outside.
+
+        Raises
+        ------
+        OptionError
+            If the map has no torus.
+        ArrayError, NonFiniteError
+            As `forward`.
+        """
+        if self.torus is None:
+            raise OptionError("the map has no torus, so there are no coordinates on it")
+        image = self.image if points is None else self.forward(points)
+        return read_only(np.stack(self.torus.coordinates(image), axis=-1))
 
 
 def _interpolate(

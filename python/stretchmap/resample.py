@@ -22,15 +22,15 @@ from scipy.spatial import cKDTree
 
 from . import _core
 from ._arrays import read_only
-from .coordinates import PointMap
 from .errors import ArrayError, FileFormatError, MissingDependencyError, OptionError, SolverError
 from .flip_free import FlipFreeOptions, FlipFreeSolver
 from .results import atomic_path, plain, table
 from .torus import TWO_PI, Torus
 
 if TYPE_CHECKING:
+    from .coordinates import PointMap
     from .registration import Registration
-    from .results import MapResult
+    from .results import LoadedMap, MapResult
 
 __all__ = ["HexMesh", "hex_mesh", "transfer"]
 
@@ -179,7 +179,7 @@ def hex_mesh(
         )
     if result.torus is None:
         raise OptionError("the map has no torus to lay a grid in")
-    points = PointMap(result)
+    points = result.point_map
     disk, quads, outer = _o_grid(block, rings)
     n = len(disk)
     u = np.repeat(np.arange(sections) * TWO_PI / sections, n)
@@ -350,7 +350,7 @@ def _drawn(
 
 
 def transfer(
-    registration: Registration,
+    registration: Registration | LoadedMap,
     values: ArrayLike,
     *,
     conserve: str = "integral",
@@ -365,7 +365,7 @@ def transfer(
 
     Parameters
     ----------
-    registration : Registration
+    registration : Registration or LoadedMap
     values : array_like, shape (n,) or (k,)
         At the vertices of ``registration.solid`` or in its tets, see ``per``.
     conserve : {"integral", "mean"}
@@ -382,10 +382,12 @@ def transfer(
     ArrayError
         If ``values`` has the wrong shape.
     OptionError
-        If an option is unknown, or the sum is zero while the carried field's is not, so that no
-        factor exists.
+        If an option is unknown, the map is no registration, or the sum is zero while the carried
+        field's is not, so that no factor exists.
     """
-    solid, target = registration.solid, registration.target
+    solid, target = registration.solid, getattr(registration, "target", None)
+    if solid is None or target is None:
+        raise OptionError("a field is carried by a registration; this map has no target solid")
     if conserve not in ("integral", "mean") or per not in ("vertex", "tet"):
         raise OptionError(f"conserve is integral or mean, per is vertex or tet: {conserve}, {per}")
     field = np.asarray(values, float)
@@ -395,7 +397,7 @@ def transfer(
     weight = (5.0 - np.sqrt(5.0)) / 20.0
     rule = np.full((4, 4), weight) + (1.0 - 4.0 * weight) * np.eye(4)
     samples = np.einsum("qc,tcx->tqx", rule, target.V[target.T]).reshape(-1, 3)
-    found = PointMap(registration).inverse(samples)
+    found = registration.point_map.inverse(samples)
     if per == "vertex":
         carried = found.interpolate(solid.T, field)
         sites, at_sites = registration.image, field

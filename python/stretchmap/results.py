@@ -15,6 +15,7 @@ import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._output import atomic_path, plain, table, versions
+from .coordinates import CarriesPoints
 from .errors import FileFormatError
 from .torus import TWO_PI, Torus
 
@@ -78,7 +80,7 @@ class IterationRecord:
     seconds: float = NAN
 
 
-class MapResult:
+class MapResult(CarriesPoints):
     """Mixin for the frozen dataclasses that hold a map.
 
     The dataclass defines the attributes ``image (n, 3)``, ``torus`` (or None), ``history`` (tuple
@@ -281,6 +283,15 @@ class LoadedMap(MapResult):
         angles = self.arrays.get("angles")
         torus = self.torus if angles is None else None
         return distortion(self.mesh, self.image, torus=torus, angles=angles)
+
+    @cached_property
+    def target(self) -> TetMesh | None:
+        """The solid mapped to; None if the file holds no registration."""
+        from .mesh import TetMesh
+
+        if "target_V" not in self.arrays or "target_T" not in self.arrays:
+            return None
+        return TetMesh(self.arrays["target_V"], self.arrays["target_T"])
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """The arrays the file held beyond the common ones."""

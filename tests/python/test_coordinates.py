@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import time
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import samples
-from stretchmap.coordinates import PointMap, forward, inverse, torus_coordinates
+from stretchmap.coordinates import PointMap
 from stretchmap.errors import ArrayError, NonFiniteError, OptionError
 from stretchmap.results import LoadedMap
 
@@ -40,8 +41,8 @@ def test_an_affine_map_is_reproduced_everywhere():
     shift = np.array([5.0, -3.0, 11.0])
     result = a_map(solid, solid.V @ A.T + shift)
     points, _ = points_inside(solid, 5000)
-    assert np.allclose(forward(result, points), points @ A.T + shift, atol=1e-12)
-    assert np.allclose(inverse(result, points @ A.T + shift), points, atol=1e-12)
+    assert np.allclose(result.forward(points), points @ A.T + shift, atol=1e-12)
+    assert np.allclose(result.inverse(points @ A.T + shift), points, atol=1e-12)
 
 
 def test_the_tet_found_holds_the_point():
@@ -65,9 +66,27 @@ def test_there_and_back_on_a_certified_map(bumpy_map):
     assert np.abs(back.points - points).max() < 1e-9 * size
 
 
+@pytest.mark.parametrize("name", ["rocker_arm_small", "kitten_small"])
+def test_there_and_back_on_scanned_shapes(load_solid, name):
+    result = sm.volume_map(load_solid(name))
+    assert result.certificate.certified
+    points, _ = points_inside(result.solid, 50_000)
+    size = np.linalg.norm(np.ptp(result.solid.V, axis=0))
+    assert np.abs(result.inverse(result.forward(points)) - points).max() < 1e-9 * size
+    outside = result.solid.V.max(axis=0) + size * np.array([[0.0, 0.0, 1e-3], [1.0, 1.0, 1.0]])
+    assert np.isnan(result.forward(outside)).all()
+    assert not result.point_map.forward(outside).inside.any()
+
+
+def test_search_structures_do_not_hinder_copies(bumpy_map):
+    before = bumpy_map.forward(bumpy_map.solid.V[:5])
+    copy = pickle.loads(pickle.dumps(bumpy_map.point_map))
+    assert np.array_equal(copy.forward(bumpy_map.solid.V[:5]).points, before)
+
+
 def test_vertices_and_boundary_points_belong_to_the_mesh(bumpy_map):
     solid = bumpy_map.solid
-    assert np.allclose(forward(bumpy_map, solid.V), bumpy_map.image, atol=1e-12)
+    assert np.allclose(bumpy_map.forward(solid.V), bumpy_map.image, atol=1e-12)
     surface = solid.surface
     weights = RNG.dirichlet(np.ones(3), surface.n_faces)
     on_faces = np.einsum("ij,ijk->ik", weights, surface.V[surface.F])
@@ -104,10 +123,10 @@ def test_coordinates_of_the_standard_solid_torus():
     solid = samples.solid_torus(20_000, R=3.0, r=1.0)
     torus = sm.Torus(3.0, 1.0)
     result = a_map(solid, solid.V, torus)
-    per_vertex = torus_coordinates(result)
+    per_vertex = result.coordinates()
     assert np.allclose(torus.xi(*per_vertex.T), solid.V, atol=1e-12)
     u, v, s = (RNG.uniform(a, b, 500) for a, b in ((0, 2 * np.pi), (0, 2 * np.pi), (0.05, 0.9)))
-    found = torus_coordinates(result, torus.xi(u, v, s))
+    found = result.coordinates(torus.xi(u, v, s))
     assert np.allclose(found, np.stack([u, v, s], axis=1), atol=1e-11)
 
 
@@ -122,12 +141,12 @@ def test_a_million_points_take_seconds():
 
 def test_bad_input_is_named(bumpy_map):
     with pytest.raises(ArrayError):
-        forward(bumpy_map, np.zeros((3, 2)))
+        bumpy_map.forward(np.zeros((3, 2)))
     with pytest.raises(NonFiniteError):
-        forward(bumpy_map, [[0.0, np.nan, 0.0]])
+        bumpy_map.forward([[0.0, np.nan, 0.0]])
     with pytest.raises(ArrayError):
         PointMap(sm.area_map(bumpy_map.solid.surface))
     with pytest.raises(OptionError):
         PointMap(bumpy_map, tolerance=-1.0)
     with pytest.raises(OptionError):
-        torus_coordinates(a_map(bumpy_map.solid, bumpy_map.image))
+        a_map(bumpy_map.solid, bumpy_map.image).coordinates()

@@ -101,6 +101,13 @@ def test_fields_keep_their_integral_or_mean(registered):
     assert np.allclose(ones, 1.0, atol=1e-12)
 
 
+def test_a_registration_read_from_a_file_carries_fields_too(registered, tmp_path):
+    registered.save(tmp_path / "r.npz")
+    field = registered.solid.V[:, 0] + 10.0
+    loaded = sm.load_map(tmp_path / "r.npz")
+    assert np.array_equal(transfer(loaded, field), transfer(registered, field))
+
+
 def test_a_field_follows_the_map():
     solid = samples.bumpy_torus(6000)
     same = register(solid, solid)
@@ -119,3 +126,5 @@ def test_bad_input_is_named(standard, registered):
         transfer(registered, np.zeros(3))
     with pytest.raises(OptionError):
         transfer(registered, np.zeros(registered.solid.n_vertices), conserve="energy")
+    with pytest.raises(OptionError, match="no target"):
+        transfer(standard, np.zeros(standard.solid.n_vertices))
