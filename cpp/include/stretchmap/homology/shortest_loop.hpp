@@ -9,11 +9,19 @@ namespace stretchmap {
 // The shortest closed walk along edges whose period over form i is target[i].
 //
 // Every loop of the class has to pass through a vertex of a loop that it crosses algebraically.
-// So from vertices of `crossing` balls are searched in the universal abelian cover (a vertex and a
-// sheet in Z^k, the sheet changing by the forms along each edge); where the ball meets its
-// translate by the target, a loop of the class closes at twice the radius. The shortest length
-// through a vertex changes at most by twice the distance between vertices, which spares most of
-// them. The result is exact.
+// From such a vertex balls are searched in the universal abelian cover (a vertex and a sheet in
+// Z^k, the sheet changing by the forms along each edge); where a ball meets its translate by the
+// target, the shortest loop of the class through the vertex closes at twice the radius.
+//
+// Genus one: where that loop L is simple, some shortest loop of all does not cross it. (In the
+// plane that covers the torus the lifts of both are lines; wherever the shortest passes L on the
+// side that does not meet the lift of L's first vertex, L is as short.) The rest is a search in the
+// annulus that is left when the torus is cut along L.
+//
+// Otherwise further vertices of `crossing` are searched from. The shortest length through a vertex
+// changes at most by twice the distance between vertices, which spares most of them.
+//
+// The result is exact either way.
 // \param edge_length (e) positive
 // \param forms       (k, e) integer closed 1-forms, a basis of H^1
 // \param target      (k) not zero
