@@ -129,10 +129,25 @@ void bind_volume(py::module_& m) {
   m.def(
       "element_energy",
       [](const Eigen::Matrix3d& J, const EnergyWeights& w) {
+        ElementBatch batch;
+        for (int l = 0; l < kLanes; ++l) {
+          for (int k = 0; k < 9; ++k) {
+            batch.edges[k][l] = J.data()[k];
+            batch.rest[k][l] = k % 4 == 0 ? 1.0 : 0.0;
+          }
+          batch.weight[l] = 1.0;
+        }
+        element_hessians(batch, w);
         Eigen::Matrix3d P;
-        Matrix9 H;
-        const double value = element_energy(J, w, P, &H);
-        return std::make_tuple(value, P, H);
+        Eigen::Matrix<double, 9, 9> H;
+        for (int k = 0; k < 9; ++k) P.data()[k] = batch.gradient[k][0];
+        int at = 0;
+        for (int a = 0; a < 3; ++a)
+          for (int b = a; b < 3; ++b, ++at)
+            for (int i = 0; i < 3; ++i)
+              for (int j = 0; j < 3; ++j)
+                H(3 * a + i, 3 * b + j) = H(3 * b + j, 3 * a + i) = batch.block[at][3 * i + j][0];
+        return std::make_tuple(batch.energy[0], P, H);
       },
       py::arg("J"), py::arg("weights"), "Energy, gradient and projected Hessian of one tet.");
   m.def("rest_triangles", &rest_triangles, py::arg("V").noconvert(), py::arg("faces").noconvert(),

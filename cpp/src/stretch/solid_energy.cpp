@@ -185,23 +185,39 @@ BlockMatrix SolidEnergy::pattern() const {
   return matrix;
 }
 
-Matrix3d SolidEnergy::jacobian(const PointsRef& x, Index t) const {
-  Matrix3d edges;
-  const RowVector3d origin = x.row(tets_(t, 0));
-  for (int a = 1; a < 4; ++a) edges.col(a - 1) = x.row(tets_(t, a)) - origin;
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rest(rest_.row(t).data());
-  return edges * rest;
+template <class Item, class Visit>
+void SolidEnergy::for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
+                              void (*evaluate)(ElementBatch&, const EnergyWeights&),
+                              const Item& item, const Visit& visit) const {
+  ElementBatch batch;
+  for (Index begin = first; begin < last; begin += kLanes) {
+    for (int l = 0; l < kLanes; ++l) {
+      const Index t = item(std::min(begin + l, last - 1));
+      const double* origin = x.data() + 3 * static_cast<std::ptrdiff_t>(tets_(t, 0));
+      for (int a = 0; a < 3; ++a) {
+        const double* corner = x.data() + 3 * static_cast<std::ptrdiff_t>(tets_(t, a + 1));
+        for (int i = 0; i < 3; ++i) batch.edges[3 * a + i][l] = corner[i] - origin[i];
+      }
+      for (int k = 0; k < 9; ++k) batch.rest[k][l] = rest_(t, k);
+      batch.weight[l] = weights_[t];
+    }
+    evaluate(batch, w);
+    for (int l = 0; l < kLanes && begin + l < last; ++l) visit(item(begin + l), l, batch);
+  }
 }
 
 EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
   const Index k = static_cast<Index>(tets_.rows());
   Vec energy(k), det(k);
+  constexpr Index kRun = 512;
 #pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
-    const Matrix3d J = jacobian(x, t);
-    det[t] = J.determinant();
-    energy[t] = weights_[t] * element_energy(J, w);
-  }
+  for (Index run = 0; run < k; run += kRun)
+    for_batches(
+        x, w, run, std::min(k, run + kRun), element_values, [](Index t) { return t; },
+        [&](Index t, int lane, const ElementBatch& batch) {
+          det[t] = batch.det[lane];
+          energy[t] = batch.energy[lane];
+        });
   EnergyReport report;
   report.energy = blocked_sum(energy);
   if (w.face > 0.0 && barrier_.size() > 0) {
@@ -222,38 +238,43 @@ EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) cons
 }
 
 // Adds the tet's share to the rows in [first, last).
-void SolidEnergy::add_element(const PointsRef& x, const EnergyWeights& w, Index t, Index first,
-                              Index last, Points& gradient, double* blocks) const {
-  Matrix3d P;
-  Matrix9 H;
-  element_energy(jacobian(x, t), w, P, blocks ? &H : nullptr);
-  P *= weights_[t];
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rest(rest_.row(t).data());
-  Eigen::Matrix<double, 4, 3> G;  // derivative of J's columns by the vertices
-  G.bottomRows<3>() = rest;
-  G.row(0) = -G.bottomRows<3>().colwise().sum();
+void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
+                              Points& gradient, double* blocks) const {
+  std::array<Index, 4> row;
   for (int a = 0; a < 4; ++a) {
-    const Index row = vertex_row_[tets_(t, a)];
-    if (row >= first && row < last) gradient.row(row) += (P * G.row(a).transpose()).transpose();
+    row[a] = vertex_row_[tets_(t, a)];
+    if (row[a] < first || row[a] >= last) row[a] = -1;
   }
+  RowVector3d others = RowVector3d::Zero();
+  for (int a = 0; a < 3; ++a) {
+    const RowVector3d g(batch.gradient[3 * a][lane], batch.gradient[3 * a + 1][lane],
+                        batch.gradient[3 * a + 2][lane]);
+    others += g;
+    if (row[a + 1] >= 0) gradient.row(row[a + 1]) += g;
+  }
+  if (row[0] >= 0) gradient.row(row[0]) -= others;
   if (!blocks) return;
 
-  H *= weights_[t];
-  std::array<Eigen::Matrix<double, 9, 3>, 4> half;  // H contracted with G on the right
-  for (int b = 1; b < 4; ++b)
-    half[b] =
-        H.middleCols<3>(0) * G(b, 0) + H.middleCols<3>(3) * G(b, 1) + H.middleCols<3>(6) * G(b, 2);
-  half[0] = -(half[1] + half[2] + half[3]);
-  for (int a = 0; a < 4; ++a) {
-    const Index row = vertex_row_[tets_(t, a)];
-    if (row < first || row >= last) continue;
-    for (int b = 0; b < 4; ++b) {
-      const Index at = slot_(t, 4 * a + b);
-      if (at < 0) continue;
-      Block(blocks + 9 * static_cast<std::ptrdiff_t>(at)) += G(a, 0) * half[b].middleRows<3>(0) +
-                                                             G(a, 1) * half[b].middleRows<3>(3) +
-                                                             G(a, 2) * half[b].middleRows<3>(6);
+  // Rows and columns of the first vertex are minus the sums of the others'.
+  std::array<std::array<Matrix3d, 4>, 4> H;
+  int at = 0;
+  for (int a = 1; a < 4; ++a) {
+    for (int b = a; b < 4; ++b, ++at) {
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) H[a][b](i, j) = batch.block[at][3 * i + j][lane];
+      if (b > a) H[b][a] = H[a][b].transpose();
     }
+  }
+  for (int a = 1; a < 4; ++a) {
+    H[a][0] = -(H[a][1] + H[a][2] + H[a][3]);
+    H[0][a] = H[a][0].transpose();
+  }
+  H[0][0] = -(H[0][1] + H[0][2] + H[0][3]);
+  for (int a = 0; a < 4; ++a) {
+    if (row[a] < 0) continue;
+    for (int b = 0; b < 4; ++b)
+      if (const Index slot = slot_(t, 4 * a + b); slot >= 0)
+        Block(blocks + 9 * static_cast<std::ptrdiff_t>(slot)) += H[a][b];
   }
 }
 
@@ -268,8 +289,13 @@ void SolidEnergy::linearise(const PointsRef& x, const EnergyWeights& w, Points& 
   const Index parts = static_cast<Index>(part_tets_.size());
 #pragma omp parallel for schedule(static, 1)
   for (Index p = 0; p < parts; ++p) {
-    for (const Index t : part_tets_[p])
-      add_element(x, w, t, part_row_[p], part_row_[p + 1], gradient, blocks);
+    const std::vector<Index>& list = part_tets_[p];
+    for_batches(
+        x, w, 0, static_cast<Index>(list.size()), blocks ? element_hessians : element_gradients,
+        [&](Index position) { return list[position]; },
+        [&](Index t, int lane, const ElementBatch& batch) {
+          add_element(batch, lane, t, part_row_[p], part_row_[p + 1], gradient, blocks);
+        });
   }
   if ((motion_.array() != kGliding).all()) return;
   const Index n_rows = rows();

@@ -61,10 +61,14 @@ class SolidEnergy {
 
  private:
   Eigen::Matrix3d frame(const PointsRef& x, Index vertex) const;
-  Eigen::Matrix3d jacobian(const PointsRef& x, Index t) const;
+  // visit(t, lane, batch) for the tets t = item(p), p in [first, last), after evaluate(batch, w).
+  template <class Item, class Visit>
+  void for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
+                   void (*evaluate)(ElementBatch&, const EnergyWeights&), const Item& item,
+                   const Visit& visit) const;
   void build_pattern();
   Index find_block(Index row, Index column) const;  // position in col_
-  void add_element(const PointsRef& x, const EnergyWeights& w, Index t, Index first, Index last,
+  void add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
                    Points& gradient, double* blocks) const;
   void add_face(const PointsRef& x, const EnergyWeights& w, Index f, Index first, Index last,
                 Points& gradient, double* blocks) const;
