@@ -10,11 +10,11 @@ from stretchmap import plot
 FOLDER = Path(__file__).resolve().parent
 
 
-def main(n_tets: int = 60_000, folder: Path = FOLDER) -> Path:
+def main(n_tets: int = 100_000, folder: Path = FOLDER) -> Path:
     """Map a vertebra-like solid and draw ``map.png``; returns its path."""
     result = sm.volume_map(sm.samples.vertebra_like(n_tets))
     path = folder / "map.png"
-    plot.save(plot.checkerboard(result), path, dpi=85)
+    plot.save(plot.levels(result), path, dpi=85)
     return path
 
 

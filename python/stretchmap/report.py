@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from ._output import cell
 from .certificate import certify
 from .errors import StretchmapError
-from .mesh import TetMesh
 from .results import MapResult, atomic_path
 
 if TYPE_CHECKING:
@@ -23,19 +22,41 @@ __all__ = ["write_report"]
 
 _CAPTIONS = {
     "checkerboard": "A checkerboard on the torus, and what it is on the source.",
-    "cutaway": "The same tets taken out of the source and of its image.",
+    "cutaway": "Source and image laid open by the same cut, plane in the image.",
+    "levels": "Five shells of equal volume around the core, laid open in steps.",
+    "registration": "Landmarks on source and target; rings are where the map carries them.",
     "ratios": "Ratios of the elements before and after.",
     "convergence": "How the iterations went.",
     "domain": "The boundary in the angles of the torus, with cells of the source.",
     "loops": "The shortest loops that bound inside and outside.",
 }
-_NESTED = ("versions", "certificate", "seconds", "torus", "certified")
+_NESTED = ("versions", "certificate", "seconds", "torus", "certified", "gauge")
+_MEANING = {
+    "flips": "elements turned over",
+    "ring_mean": "mean of the ratios per vertex, (6.3) or (6.5); 1 is ideal",
+    "ring_sd": "spread of the ratios per vertex, (6.3) or (6.5)",
+    "element_mad": "mean of |ratio - 1| per element",
+    "element_sd": "spread of the ratios per element",
+    "element_abs_sd": "spread of |ratio - 1| per element",
+    "ratio_min": "smallest ratio of an element; positive where none is turned over",
+    "ratio_max": "largest ratio of an element",
+    "total_distortion": "total distortion (6.2) or (6.4); 0 is ideal",
+    "angle_mean": "distortion of angles, mean over the elements; 1 is ideal",
+    "angle_max": "distortion of angles, worst element",
+    "energy": "stretch energy of the map",
+    "energy_bound": "least stretch energy possible",
+    "iterations": "steps of all stages",
+    "torus": "radii of centre circle and tube, in the unit of the mesh",
+    "landmark_error": "largest distance of a landmark from its counterpart, over the target's size",
+    "snapped": "largest distance of a landmark given as a point from its vertex",
+    "added_vertices": "put in where the boundary alone decided about tets",
+}
 _STYLE = """
 body { font: 15px/1.5 sans-serif; color: #222;
        max-width: 60rem; margin: 2rem auto; padding: 0 1rem }
 h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2rem }
 table { border-collapse: collapse } td { padding: 0.1rem 1.2rem 0.1rem 0; vertical-align: top }
-td:last-child { font-variant-numeric: tabular-nums }
+td:nth-child(2) { font-variant-numeric: tabular-nums } td:nth-child(3) { color: #555 }
 figure { margin: 1.5rem 0 } img { max-width: 100% } figcaption { color: #555 }
 .verdict { padding: 0.6rem 1rem; border-left: 5px solid; background: #f4f4f4 }
 .yes { border-color: #0072B2 } .no { border-color: #D55E00 }
@@ -45,7 +66,8 @@ figure { margin: 1.5rem 0 } img { max-width: 100% } figcaption { color: #555 }
 def write_report(result: MapResult, path: str | os.PathLike[str], source: str = "") -> None:
     """Write one self-contained HTML page about a map.
 
-    Pictures a map has no data for (a history, a torus) are left out, and the page says why.
+    Pictures a map has no data for (a history, a torus, a target) are left out; of one that fails
+    all the same, as on the boundary of a damaged mesh, the page says why.
 
     Parameters
     ----------
@@ -105,9 +127,8 @@ def _pictures(result: MapResult) -> list[str]:
     from . import plot
 
     parts, missing = [], []
-    for kind, caption in _CAPTIONS.items():
-        if kind == "cutaway" and not isinstance(result.mesh, TetMesh):
-            continue
+    drawable = plot.kinds(result)
+    for kind, caption in ((kind, _CAPTIONS[kind]) for kind in _CAPTIONS if kind in drawable):
         try:
             figure = plot.picture(result, kind)
         except StretchmapError as error:
@@ -133,7 +154,7 @@ def _embedded(figure: Figure) -> str:
 def _table(rows: Mapping[str, Any]) -> str:
     lines = (
         f"<tr><td>{html.escape(str(name).replace('_', ' '))}</td>"
-        f"<td>{html.escape(cell(value))}</td></tr>"
+        f"<td>{html.escape(cell(value))}</td><td>{html.escape(_MEANING.get(name, ''))}</td></tr>"
         for name, value in rows.items()
     )
     return f"<table>{''.join(lines)}</table>"

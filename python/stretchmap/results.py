@@ -293,6 +293,12 @@ class LoadedMap(MapResult):
             return None
         return TetMesh(self.arrays["target_V"], self.arrays["target_T"])
 
+    def to_dict(self, history: bool = False) -> dict[str, Any]:
+        """As `MapResult.to_dict`, with what else the file says, but for its certificate."""
+        found = super().to_dict(history)
+        known = (*found, "history", "certified", "certificate")
+        return found | {name: value for name, value in self.meta.items() if name not in known}
+
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """The arrays the file held beyond the common ones."""
         return {k: a for k, a in self.arrays.items() if k not in ("ratios", "ring_ratios")}

@@ -1,7 +1,8 @@
 """Scenes of maps in three dimensions, by the optional package PyVista.
 
 Every function returns a ``pyvista.Plotter`` that has not been shown: call ``show()`` to turn it
-about with the mouse, or `save` for a picture. `stretchmap.plot` draws the same without PyVista.
+about with the mouse, or `save` for a picture. `stretchmap.plot` draws these and more by matplotlib
+alone.
 """
 
 from __future__ import annotations

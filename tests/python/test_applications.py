@@ -90,6 +90,13 @@ def test_register_command(folder, capsys):
     assert report["certified"] and report["landmarks"] == 20 and report["landmark_error"] < 1e-6
     assert sm.load_map(out).title == "registration"
     assert "landmark error" in capsys.readouterr().out
+    pytest.importorskip("matplotlib")
+    assert run("plot", out, "-o", folder / "pair.png", "--kind", "registration") == 0
+    assert run("plot", out, "-o", folder / "no.png", "--kind", "levels") == 2
+    assert "no torus" in capsys.readouterr().err and not (folder / "no.png").exists()
+    assert run("report", out, "-o", folder / "r.html") == 0
+    page = (folder / "r.html").read_text()
+    assert page.count("<img ") == 5 and "landmark error" in page and "Not drawn" not in page
 
 
 def test_register_command_names_bad_landmarks(folder, capsys):

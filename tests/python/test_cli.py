@@ -317,9 +317,23 @@ def test_plot_and_report_of_a_map(folder):
     assert (folder / "p.png").read_bytes().startswith(b"\x89PNG")
     assert main(["report", "m.npz", "-o", "r.html"]) == 0
     page = (folder / "r.html").read_text()
-    assert page.count("data:image/png;base64,") == 6
+    assert page.count("data:image/png;base64,") == 7
     assert "Certified" in page
-    assert "http" not in page and 'src="data:' in page
+    assert "://" not in page and 'src="data:' in page
+    assert "spread of the ratios per vertex" in page
+
+
+def test_plot_options_belong_to_their_kinds(folder, capsys):
+    pytest.importorskip("matplotlib")
+    assert main(["volume", "solid.npz", "-o", "m.npz", "--c", "1", "--max-iter", "1", "-q"]) == 0
+    assert main(["plot", "m.npz", "-o", "u.png", "--kind", "levels", "--by", "u"]) == 0
+    assert main(["plot", "m.npz", "-o", "c.svg", "--kind", "cutaway", "--colour", "ratio"]) == 0
+    capsys.readouterr()
+    assert main(["plot", "m.npz", "-o", "x.png", "--kind", "loops", "--by", "u"]) == 2
+    assert "has no option 'by'" in capsys.readouterr().err
+    assert main(["plot", "m.npz", "-o", "x.png", "--kind", "registration"]) == 2
+    assert "needs a registration" in capsys.readouterr().err
+    assert not (folder / "x.png").exists()
 
 
 def test_demo_needs_no_data(tmp_path, capsys):

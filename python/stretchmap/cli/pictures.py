@@ -15,12 +15,29 @@ from ._common import Json, MapFile, Output, Quiet
 class Kind(str, Enum):
     """Values of ``--kind``, the keys of ``stretchmap.plot.KINDS``."""
 
+    checkerboard = "checkerboard"
+    cutaway = "cutaway"
+    levels = "levels"
+    registration = "registration"
+    loops = "loops"
+    domain = "domain"
     ratios = "ratios"
     convergence = "convergence"
-    domain = "domain"
-    checkerboard = "checkerboard"
-    loops = "loops"
-    cutaway = "cutaway"
+
+
+class By(str, Enum):
+    """Values of ``--by``."""
+
+    s = "s"
+    u = "u"
+    v = "v"
+
+
+class Colour(str, Enum):
+    """Values of ``--colour``."""
+
+    coordinate = "coordinate"
+    ratio = "ratio"
 
 
 class Sample(str, Enum):
@@ -42,15 +59,30 @@ def plot(
     map_file: MapFile,
     output: Output,
     kind: Annotated[Kind, typer.Option(help="What to draw.")] = Kind.ratios,
+    by: Annotated[
+        By | None,
+        typer.Option(help="For levels: shells (s, default), sectors round the axis or the tube."),
+    ] = None,
+    colour: Annotated[
+        Colour | None,
+        typer.Option(help="For cutaway: place in the source (default) or volume ratio."),
+    ] = None,
     dpi: Annotated[float, typer.Option(help="Dots per inch.", min=20.0, max=1200.0)] = 150.0,
 ) -> None:
-    """Draw a picture of a map (.png, .pdf or .svg)."""
+    """Draw a picture of a map (.png, .pdf or .svg).
+
+    checkerboard: of the torus, pulled back. cutaway: inside of source and image. levels: shells or
+    sectors of equal volume. registration: source and target with landmarks. loops: handle and
+    tunnel. domain: the boundary in its angles. ratios: histograms. convergence: the iterations.
+    """
     from ..plot import picture, save
     from ..results import load_map
 
     common.check_output(output, (".png", ".pdf", ".svg"), map_file)
     common.require_package("matplotlib", "drawing", "plot")
-    save(picture(load_map(map_file), kind.value), output, dpi)
+    given = {"by": by, "colour": colour}
+    options = {name: value.value for name, value in given.items() if value is not None}
+    save(picture(load_map(map_file), kind.value, **options), output, dpi)
 
 
 def report(map_file: MapFile, output: Output) -> None:

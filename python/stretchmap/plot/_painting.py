@@ -49,6 +49,10 @@ class View:
         axes = np.stack([right, np.cross(towards, right), towards])
         return axes if self.frame is None else axes @ self.frame
 
+    def opposite(self) -> View:
+        """Looking the other way along the same line."""
+        return View(-self.elevation, self.azimuth + 180.0, self.frame)
+
 
 @dataclass
 class Scene:
@@ -57,7 +61,6 @@ class Scene:
     view: View
     _polygons: list[Array] = field(default_factory=list)
     _colours: list[Array] = field(default_factory=list)
-    _depths: list[Array] = field(default_factory=list)
     _outlines: list[tuple[Array, Any]] = field(default_factory=list)
 
     def add_faces(self, corners: Array, colours: Array) -> None:
@@ -75,10 +78,9 @@ class Scene:
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = normals / np.where(lengths > 0.0, lengths, 1.0)
         seen = normals[:, 2] > 0.0
-        bright = 0.45 + 0.55 * np.clip(normals[seen] @ _LIGHT, 0.0, 1.0)
-        self._polygons.append(x[seen, :, :2])
+        bright = 0.55 + 0.45 * np.clip(normals[seen] @ _LIGHT, 0.0, 1.0)
+        self._polygons.append(x[seen])
         self._colours.append(np.clip(colours[seen] * bright[:, None], 0.0, 1.0))
-        self._depths.append(x[seen, :, 2].mean(axis=1))
 
     def add_loop(self, points: Array, colour: Any, width: float, lift: float) -> None:
         """Add a closed polygon: a ribbon, only dotted where faces lie before it.
@@ -102,18 +104,44 @@ class Scene:
         along = along / np.where(length > 0.0, length, 1.0)
         side = 0.5 * width * np.stack([-along[:, 1], along[:, 0]], axis=1)
         a, b = start[:, :2] - 0.3 * width * along, end[:, :2] + 0.3 * width * along
-        depth = 0.5 * (start[:, 2] + end[:, 2]) + lift
+        depth = np.tile(0.5 * (start[:, 2] + end[:, 2]) + lift, (3, 1)).T[:, :, None]
         for triangle in ((a - side, b - side, b + side), (a - side, b + side, a + side)):
-            self._polygons.append(np.stack(triangle, axis=1))
+            self._polygons.append(np.concatenate([np.stack(triangle, axis=1), depth], axis=2))
             self._colours.append(np.tile(to_rgb(colour), (len(points), 1)))
-            self._depths.append(depth)
+
+    def visible(self, points: Array, lift: float) -> NDArray[np.bool_]:
+        """Whether no face lies before a point, brought nearer to the viewer by ``lift``.
+
+        Parameters
+        ----------
+        points : (n, 3) ndarray
+            A few: each is compared with every face.
+        lift : float
+
+        Returns
+        -------
+        (n,) ndarray of bool
+        """
+        corners = np.concatenate(self._polygons)
+        low, high = corners.min(axis=1)[:, :2], corners.max(axis=1)
+        places = points @ self.view.axes.T + np.array([0.0, 0.0, lift])
+        seen = np.ones(len(points), bool)
+        for i, place in enumerate(places):
+            near = (low <= place[:2]).all(axis=1) & (high >= place).all(axis=1)
+            to = corners[near] - place
+            before, after = np.roll(to, -1, axis=1), np.roll(to, -2, axis=1)
+            weights = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+            above = (weights * to[..., 2]).sum(axis=1)
+            seen[i] = not ((weights >= 0.0).all(axis=1) & (above > 0.0)).any()
+        return seen
 
     def draw(self, axes: Axes) -> None:
         """Paint everything, the farthest first, and fit the axes to it."""
         from matplotlib.collections import PolyCollection
 
         polygons, colours = np.concatenate(self._polygons), np.concatenate(self._colours)
-        order = np.argsort(np.concatenate(self._depths), kind="stable")
+        order = np.argsort(polygons[:, :, 2].mean(axis=1), kind="stable")
+        polygons = polygons[:, :, :2]
         axes.add_collection(
             PolyCollection(
                 polygons[order],

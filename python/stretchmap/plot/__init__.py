@@ -1,0 +1,124 @@
+"""Pictures of maps. Every function returns a matplotlib Figure; none shows it.
+
+Colours are those of viridis, cividis and Okabe and Ito, told apart by colour-blind eyes and in grey
+print. All functions take any map: a result of `volume_map`, `area_map`, `conformal_map` or
+`register`, or one read by `load_map`. Statistics of a map, its boundary surface, the inside of a
+solid and pairs of solids have a module each; ``_painting`` draws surfaces without a graphics card.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import FileFormatError, OptionError
+from ..mesh import TetMesh
+from ..results import MapResult
+from .pairs import registration
+from .solids import cutaway, levels
+from .statistics import convergence, ratios
+from .surfaces import checkerboard, domain, loops
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "KINDS",
+    "checkerboard",
+    "convergence",
+    "cutaway",
+    "domain",
+    "kinds",
+    "levels",
+    "loops",
+    "picture",
+    "ratios",
+    "registration",
+    "save",
+]
+
+KINDS: dict[str, Callable[..., Figure]] = {
+    "checkerboard": checkerboard,
+    "cutaway": cutaway,
+    "levels": levels,
+    "registration": registration,
+    "loops": loops,
+    "domain": domain,
+    "ratios": ratios,
+    "convergence": convergence,
+}
+
+
+def kinds(result: MapResult) -> tuple[str, ...]:
+    """Kinds of pictures a map has data for, keys of ``KINDS``.
+
+    Parameters
+    ----------
+    result : MapResult
+    """
+    solid, torus = isinstance(result.mesh, TetMesh), result.torus is not None
+    lacking = {
+        "checkerboard": not torus,
+        "domain": not torus,
+        "cutaway": not solid,
+        "levels": not (solid and torus),
+        "registration": getattr(result, "target", None) is None,
+        "convergence": not result.history,
+    }
+    return tuple(kind for kind in KINDS if not lacking.get(kind, False))
+
+
+def picture(result: MapResult, kind: str, **options: Any) -> Figure:
+    """Picture of a map by name.
+
+    Parameters
+    ----------
+    result : MapResult
+    kind : str
+        A key of ``KINDS``; `kinds` names those the map has data for.
+    **options
+        Those of the function of that name.
+
+    Raises
+    ------
+    OptionError
+        Unknown kind, or an option it does not have.
+    MeshError, OptionError
+        As the function.
+    """
+    if kind not in KINDS:
+        raise OptionError(f"unknown kind of picture {kind!r}; known are {', '.join(KINDS)}")
+    for option in options:
+        if option not in inspect.signature(KINDS[kind]).parameters:
+            raise OptionError(f"a picture of kind {kind!r} has no option {option!r}")
+    return KINDS[kind](result, **options)
+
+
+def save(figure: Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> None:
+    """Write a figure to a file that appears whole or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    path : path-like
+        ``.png``, ``.pdf`` or ``.svg``.
+    dpi : float
+        Dots per inch.
+
+    Raises
+    ------
+    FileFormatError
+        Another suffix.
+    OSError
+        The file cannot be written.
+    """
+    from ..results import atomic_path
+
+    path = Path(path)
+    if path.suffix.lower() not in (".png", ".pdf", ".svg"):
+        raise FileFormatError(f"{path}: pictures are .png, .pdf or .svg")
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi)
