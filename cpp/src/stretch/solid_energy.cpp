@@ -4,11 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 namespace stretchmap {
 namespace {
@@ -17,24 +12,6 @@ using Eigen::Matrix3d;
 using Eigen::RowVector3d;
 using Eigen::Vector3d;
 using Block = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
-
-// Position along the Z-order curve with 10 bits an axis.
-std::uint32_t z_order(const RowVector3d& unit) {
-  std::uint32_t code = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto cell = static_cast<std::uint32_t>(std::clamp(unit[axis], 0.0, 0.999999) * 1024.0);
-    for (int bit = 0; bit < 10; ++bit) code |= ((cell >> bit) & 1u) << (3 * bit + axis);
-  }
-  return code;
-}
-
-int thread_count() {
-#ifdef _OPENMP
-  return omp_get_max_threads();
-#else
-  return 1;
-#endif
-}
 
 // Sum in blocks of fixed size: the result does not depend on the number of threads.
 double blocked_sum(const Vec& values) {
@@ -66,124 +43,6 @@ double first_root(double d0, double d1, double d2, double d3, double limit) {
 }
 
 }  // namespace
-
-SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
-                         const FlagsRef& motion, double R, double r, const PointsRef& x,
-                         BoundaryBarrier barrier)
-    : motion_(motion), R_(R), r_(r), barrier_(std::move(barrier)) {
-  const Index n = static_cast<Index>(motion.size()), k = static_cast<Index>(tets.rows());
-  const RowVector3d low = x.colwise().minCoeff();
-  const double size = std::max((x.colwise().maxCoeff() - low).maxCoeff(), 1e-300);
-  std::vector<std::uint32_t> code(n);
-  std::vector<Index> active;
-  for (Index i = 0; i < n; ++i) {
-    if (motion[i] == kFixed) continue;
-    code[i] = z_order((x.row(i) - low) / size);
-    active.push_back(i);
-  }
-  std::stable_sort(active.begin(), active.end(),
-                   [&](Index a, Index b) { return code[a] < code[b]; });
-  row_vertex_ = Eigen::Map<const IndexVec>(active.data(), static_cast<Index>(active.size()));
-  vertex_row_.setConstant(n, -1);
-  for (Index row = 0; row < row_vertex_.size(); ++row) vertex_row_[row_vertex_[row]] = row;
-
-  std::vector<Index> lowest(k), order(k);
-  for (Index t = 0; t < k; ++t) {
-    lowest[t] = std::numeric_limits<Index>::max();
-    for (int a = 0; a < 4; ++a)
-      if (vertex_row_[tets(t, a)] >= 0) lowest[t] = std::min(lowest[t], vertex_row_[tets(t, a)]);
-  }
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Index a, Index b) { return lowest[a] < lowest[b]; });
-  tets_.resize(k, 4);
-  rest_.resize(k, 9);
-  weights_.resize(k);
-  for (Index t = 0; t < k; ++t) {
-    tets_.row(t) = tets.row(order[t]);
-    rest_.row(t) = rest.row(order[t]);
-    weights_[t] = weights[order[t]];
-  }
-  build_pattern();
-}
-
-void SolidEnergy::build_pattern() {
-  const Index n_rows = rows(), k = static_cast<Index>(tets_.rows());
-  // Incidence row -> tets, then the sorted union of their rows.
-  std::vector<Index> start(n_rows + 1, 0);
-  for (Index t = 0; t < k; ++t)
-    for (int a = 0; a < 4; ++a)
-      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) ++start[row + 1];
-  for (Index row = 0; row < n_rows; ++row) start[row + 1] += start[row];
-  std::vector<Index> incident(start[n_rows]), cursor(start.begin(), start.end() - 1);
-  for (Index t = 0; t < k; ++t)
-    for (int a = 0; a < 4; ++a)
-      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) incident[cursor[row]++] = t;
-
-  row_ptr_.resize(n_rows + 1);
-  row_ptr_[0] = 0;
-  std::vector<Index> columns, neighbours;
-  for (Index row = 0; row < n_rows; ++row) {
-    neighbours.assign(1, row);
-    for (Index p = start[row]; p < start[row + 1]; ++p)
-      for (int a = 0; a < 4; ++a)
-        if (const Index other = vertex_row_[tets_(incident[p], a)]; other >= 0)
-          neighbours.push_back(other);
-    std::sort(neighbours.begin(), neighbours.end());
-    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
-    columns.insert(columns.end(), neighbours.begin(), neighbours.end());
-    row_ptr_[row + 1] = static_cast<Index>(columns.size());
-  }
-  col_ = Eigen::Map<const IndexVec>(columns.data(), static_cast<Index>(columns.size()));
-
-  slot_.setConstant(k, 16, -1);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
-    for (int a = 0; a < 4; ++a) {
-      const Index row = vertex_row_[tets_(t, a)];
-      if (row < 0) continue;
-      for (int b = 0; b < 4; ++b) {
-        const Index other = vertex_row_[tets_(t, b)];
-        if (other >= 0) slot_(t, 4 * a + b) = find_block(row, other);
-      }
-    }
-  }
-
-  const Index parts = std::max<Index>(1, std::min<Index>(thread_count(), n_rows));
-  part_row_.resize(parts + 1);
-  for (Index p = 0; p <= parts; ++p)
-    part_row_[p] = static_cast<Index>(static_cast<std::int64_t>(n_rows) * p / parts);
-  const auto touching = [&](const auto& elements, int corners) {
-    std::vector<std::vector<Index>> lists(parts);
-    for (Index t = 0; t < elements.rows(); ++t) {
-      for (Index p = 0; p < parts; ++p) {
-        bool touches = false;
-        for (int a = 0; a < corners; ++a) {
-          const Index row = vertex_row_[elements(t, a)];
-          touches = touches || (row >= part_row_[p] && row < part_row_[p + 1]);
-        }
-        if (touches) lists[p].push_back(t);
-      }
-    }
-    return lists;
-  };
-  part_tets_ = touching(tets_, 4);
-  part_faces_ = touching(barrier_.faces(), 3);
-}
-
-Index SolidEnergy::find_block(Index row, Index column) const {
-  const Index* first = col_.data() + row_ptr_[row];
-  const Index* last = col_.data() + row_ptr_[row + 1];
-  return static_cast<Index>(std::lower_bound(first, last, column) - col_.data());
-}
-
-BlockMatrix SolidEnergy::pattern() const {
-  BlockMatrix matrix;
-  matrix.row_ptr = row_ptr_;
-  matrix.col = col_;
-  matrix.values.setZero(9 * col_.size());
-  return matrix;
-}
 
 template <class Item, class Visit>
 void SolidEnergy::for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
