@@ -2,6 +2,7 @@
 #include "stretchmap/apply/chart_locator.hpp"
 #include "stretchmap/apply/split_tets.hpp"
 #include "stretchmap/apply/surface_match.hpp"
+#include "stretchmap/apply/surface_relax.hpp"
 #include "stretchmap/apply/tet_locator.hpp"
 
 namespace stretchmap::bindings {
@@ -42,6 +43,33 @@ void bind_apply(py::module_& m) {
       py::arg("chart"), py::arg("y").noconvert(), py::arg("X").noconvert(),
       py::arg("slopes").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
       release_gil());
+
+  m.def("flat_value", &flat_value, py::arg("chart"), py::arg("y").noconvert(), py::arg("lattice"),
+        py::arg("rest").noconvert(), py::arg("weights").noconvert(), release_gil());
+  m.def(
+      "flat_model",
+      [](const SurfaceChart& chart, const Points2Ref& y, const Eigen::Matrix2d& lattice,
+         const RowsRef& rest, const VecRef& weights) {
+        MatchModel model = flat_model(chart, y, lattice, rest, weights);
+        return std::make_pair(std::move(model.gradient), std::move(model.hessian));
+      },
+      py::arg("chart"), py::arg("y").noconvert(), py::arg("lattice"), py::arg("rest").noconvert(),
+      py::arg("weights").noconvert(), release_gil());
+  m.def(
+      "relax_match",
+      [](const SurfaceChart& chart, const ChartLocator& locator, const PointsRef& target_points,
+         const FacesRef& target_faces, const RowsRef& target_slopes, const RowsRef& rest,
+         const VecRef& weights, const FlagsRef& held, int sweeps, Points2 y, Points X, Vec reach) {
+        const SurfaceWalk target{locator, target_points, target_faces, target_slopes};
+        const RelaxReport report =
+            relax_match(chart, target, rest, weights, held, sweeps, y, X, reach, signal_poll());
+        return std::make_tuple(std::move(y), std::move(X), std::move(reach), report.gain,
+                               report.moved);
+      },
+      py::arg("chart"), py::arg("locator"), py::arg("target_points").noconvert(),
+      py::arg("target_faces").noconvert(), py::arg("target_slopes").noconvert(),
+      py::arg("rest").noconvert(), py::arg("weights").noconvert(), py::arg("held").noconvert(),
+      py::arg("sweeps"), py::arg("y"), py::arg("X"), py::arg("reach"), release_gil());
 
   py::class_<TetSplit>(m, "TetSplit")
       .def_readonly("tets", &TetSplit::tets)

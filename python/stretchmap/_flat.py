@@ -1,4 +1,4 @@
-"""The equal-area flat torus of a surface, and the choice of how two of them lie on each other."""
+"""The flat torus of a surface, and the choice of how two of them lie on each other."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from . import _core
@@ -15,13 +16,17 @@ from .errors import SolverError
 from .mesh import TriMesh
 
 _SEM_STEPS = 10
+_FLAT_STEPS, _FLAT_SHORTEST, _FLAT_TOL = 30, 1e-4, 1e-3
 _GRID = 20  # shifts tried along either coordinate
 _SAMPLE = 300  # vertices the rigid fit is judged by
 
 
 @dataclass(frozen=True, eq=False)
 class FlatSurface:
-    """A genus-one surface with coordinates on the unit flat torus in which areas are (nearly) true.
+    """A genus-one surface with coordinates on the unit flat torus.
+
+    Neither areas nor angles are true, but together they are distorted as little as can be, and no
+    face is squeezed.
 
     Attributes
     ----------
@@ -37,9 +42,12 @@ class FlatSurface:
 
     @classmethod
     def of(cls, surface: TriMesh) -> FlatSurface:
-        """Conformal map, then stretch energy minimisation (Algorithm 4.1) in the flat torus.
+        """Conformal map, stretch energy minimisation (Algorithm 4.1) in the flat torus, and Newton
+        steps on the distortion of area and shape (``flat_value``).
 
-        Of its iterates the one with the least ``sum |f| (ratio + 1 / ratio)`` is taken.
+        Of the iterates of Algorithm 4.1 the one with the least ``sum |f| (ratio + 1 / ratio)`` is
+        taken. By itself it will not do: faces may nearly collapse in it, and near those what is
+        straight in the flat torus is crooked on the surface.
 
         Raises
         ------
@@ -59,7 +67,8 @@ class FlatSurface:
             if value < best:
                 best, turns = value, sem.turns.copy()
             sem.step()
-        return cls(surface, conformal.forms, np.ascontiguousarray(turns))
+        turns = _least_distorted(surface, chart, conformal.lattice, np.ascontiguousarray(turns))
+        return cls(surface, conformal.forms, turns)
 
     def changed(self, gauge: Gauge) -> FlatSurface:
         """The same surface in coordinates changed by a gauge."""
@@ -74,7 +83,7 @@ class FlatSurface:
         return _core.SurfaceChart(self.surface.topology, self.forms)
 
     @cached_property
-    def _locator(self) -> _core.ChartLocator:
+    def locator(self) -> _core.ChartLocator:
         return _core.ChartLocator(self.chart, self.turns)
 
     def locate(self, y: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
@@ -85,7 +94,7 @@ class FlatSurface:
         SolverError
             If a point lies in no face: the chart is folded there.
         """
-        faces, weights = self._locator.locate(np.ascontiguousarray(y))
+        faces, weights = self.locator.locate(np.ascontiguousarray(y))
         lost = np.flatnonzero(faces < 0)
         if len(lost):
             raise SolverError(f"{len(lost)} points lie in no face: the flat chart is folded", lost)
@@ -106,13 +115,19 @@ class FlatSurface:
         )
 
     @cached_property
-    def _vertex_slopes(self) -> NDArray[np.float64]:
+    def face_slopes(self) -> NDArray[np.float64]:
+        """(m, 6) derivatives of `points` in each face; row-major 3x2 matrices."""
         F, V = self.surface.F, self.surface.V
         shift = np.stack([self.chart.shift_u, self.chart.shift_v], axis=-1)
         flat = self.turns[F] + shift
         flat_edges = np.stack([flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]], axis=-1)
         edges = np.stack([V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]], axis=-1)
-        slopes = (edges @ np.linalg.inv(flat_edges)).reshape(-1, 6)
+        return np.ascontiguousarray((edges @ np.linalg.inv(flat_edges)).reshape(-1, 6))
+
+    @cached_property
+    def _vertex_slopes(self) -> NDArray[np.float64]:
+        F, V = self.surface.F, self.surface.V
+        slopes = self.face_slopes
         area = self.surface.face_areas
         ring = np.bincount(F.ravel(), np.repeat(area, 3), minlength=len(V))
         sums = [
@@ -120,6 +135,45 @@ class FlatSurface:
             for column in slopes.T
         ]
         return np.stack(sums, axis=1) / ring[:, None]
+
+
+def _least_distorted(
+    surface: TriMesh,
+    chart: _core.SurfaceChart,
+    lattice: NDArray[np.float64],
+    turns: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Projected Newton steps on ``flat_value``; the start is returned if it is folded."""
+    periods = np.ascontiguousarray(lattice.T / math.sqrt(abs(np.linalg.det(lattice))))
+    rest = _core.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
+    weights = surface.face_areas / surface.area
+    energy = _core.flat_value(chart, turns, periods, rest, weights)
+    for _ in range(_FLAT_STEPS if math.isfinite(energy) else 0):
+        gradient, hessian = _core.flat_model(chart, turns, periods, rest, weights)
+        step, alpha = damped_solve(gradient, hessian).reshape(-1, 2), 1.0
+        while alpha > _FLAT_SHORTEST:
+            moved = turns + alpha * step
+            value = _core.flat_value(chart, moved, periods, rest, weights)
+            if value < energy:
+                break
+            alpha *= 0.5
+        else:
+            break
+        small = energy - value <= _FLAT_TOL * energy
+        turns, energy = moved, value
+        if small:
+            break
+    return turns
+
+
+def damped_solve(gradient: NDArray[np.float64], hessian: sp.csr_matrix) -> NDArray[np.float64]:
+    """Newton step for a Hessian that is positive semi-definite only."""
+    diagonal = hessian.diagonal()
+    matrix = (hessian + sp.diags(1e-6 * diagonal + 1e-12 * diagonal.mean())).tocsr()
+    matrix.sort_indices()
+    solver = _core.SpdSolver(matrix, "direct")
+    step, _ = solver.solve(-gradient[:, None], np.zeros((len(gradient), 1)), must_converge=False)
+    return np.asarray(step[:, 0])
 
 
 @dataclass(frozen=True)

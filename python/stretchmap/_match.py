@@ -22,10 +22,12 @@ _SHORTEST = 1e-3  # steps shorter than this make no progress
 _RISE = 1.0  # energy that may be spent on one step towards the landmarks; 0 for an isometry
 _DRAG_STEPS = 60
 _SHORT = 0.02  # a step shorter than this asks for another kind of step
-_PATIENCE = 30  # stalled steps in a row that end the iteration
-# Surfaces have edges, where the energy has kinks and a few faces block the step of all others.
-# After a step that stalled, a share of the vertices drawn by lot stays put.
-_HELD = (0.0, 0.0, 0.3, 0.3, 0.6, 0.6)
+# Surfaces have edges, where the energy has kinks and a few faces block the step of all others:
+# after the two kinds of Newton step, vertices are moved one by one.
+_KINDS = ("chord", "tangent", "one by one")
+_SWEEPS = 2
+_REACH = 0.25  # of the mean edge at a vertex: first try of its own step
+_ROUND_TOL = 10.0  # times tol: least decrease of a round of all kinds
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ def _worst_pair(
     return pairs[int(np.argmax(strain))].astype(np.intp)
 
 
-class _Problem:
+class SurfaceProblem:
     """Positions y in the target's flat torus, their points in space and the energy there."""
 
     def __init__(self, source: FlatSurface, target: FlatSurface) -> None:
@@ -123,6 +125,8 @@ class _Problem:
         self.rest = _core.rest_triangles(surface.V, surface.F, target.surface.area / surface.area)
         self.weights = surface.face_areas / surface.area
         self.held = np.zeros(surface.n_vertices, bool)
+        self._edges = surface.edges
+        self._reach: NDArray[np.float64] | None = None
 
     def place(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         points = self.target.points(y)
@@ -156,6 +160,22 @@ class _Problem:
         step[free] = moved[:, 0]
         return step.reshape(-1, 2)
 
+    def one_by_one(
+        self, y: NDArray[np.float64], points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Every vertex that is not held moved by itself, if that lowers the energy."""
+        if self._reach is None:
+            lengths = np.linalg.norm(points[self._edges[:, 1]] - points[self._edges[:, 0]], axis=1)
+            ends = self._edges.ravel()
+            total = np.bincount(ends, np.repeat(lengths, 2), minlength=len(y))
+            self._reach = _REACH * total / np.bincount(ends, minlength=len(y))
+        surface = self.target.surface
+        y, points, self._reach, _, _ = _core.relax_match(
+            self.chart, self.target.locator, surface.V, surface.F, self.target.face_slopes,
+            self.rest, self.weights, self.held.astype(np.uint8), _SWEEPS, y, points, self._reach,
+        )  # fmt: skip
+        return y, points
+
 
 def match_surfaces(
     source: FlatSurface,
@@ -180,7 +200,8 @@ def match_surfaces(
     max_iter : int
         Most steps.
     tol : float
-        Stop when no kind of step lowers the energy by more than this share.
+        Another kind of step is tried when one lowers the energy by no more than this share; the
+        iteration stops when a round of all kinds lowers it by no more than ten times as much.
     progress : Progress, optional
 
     Returns
@@ -195,7 +216,7 @@ def match_surfaces(
         If the start is folded.
     """
     clock = time.perf_counter()
-    problem = _Problem(source, target)
+    problem = SurfaceProblem(source, target)
     points, energy = problem.place(y)
     if not math.isfinite(energy):
         raise SolverError("the start of the boundary map is folded")
@@ -211,7 +232,6 @@ def match_surfaces(
         report(progress, "match", len(history) - 1, max_iter, energy=energy)
 
     record(math.nan)
-    rng = np.random.default_rng(0)
     # The free optimum first: it is the best place to draw the landmarks from.
     ids = landmarks[:, 0]
     for holding in (False, True) if len(ids) else (False,):
@@ -219,27 +239,31 @@ def match_surfaces(
             problem.held[ids] = True
             goals = target.turns[landmarks[:, 1]]
             y, points, energy = _draw(problem, y, points, energy, ids, goals, history)
-        pinned = problem.held.copy()
-        tangent, stalled = False, 0
+        stalled, at_start = 0, energy
         for _ in range(max_iter):
-            problem.held = pinned | (rng.random(len(y)) < _HELD[stalled % len(_HELD)])
-            step = problem.newton_step(y, points, tangent)
-            taken, before = _search(problem, y, step, energy), energy
-            if taken is not None:
-                alpha, y, points, energy = taken
-                record(alpha)
-            if taken is None or alpha < _SHORT or before - energy <= tol * before:
-                tangent, stalled = not tangent, stalled + 1
-                if stalled == _PATIENCE:
-                    break
+            kind, before = _KINDS[stalled % len(_KINDS)], energy
+            alpha = 0.0
+            if kind == "one by one":
+                y, points = problem.one_by_one(y, points)
+                energy = problem.place(y)[1]
+                record(math.nan)
             else:
-                stalled = 0
-        problem.held = pinned
+                step = problem.newton_step(y, points, kind == "tangent")
+                taken = _search(problem, y, step, energy)
+                if taken is not None:
+                    alpha, y, points, energy = taken
+                    record(alpha)
+            if alpha < _SHORT or before - energy <= tol * before:
+                stalled += 1
+                if stalled % len(_KINDS) == 0:
+                    if at_start - energy <= _ROUND_TOL * tol * at_start:
+                        break
+                    at_start = energy
     return Match(y, points, tuple(history))
 
 
 def _search(
-    problem: _Problem, y: NDArray[np.float64], step: NDArray[np.float64], energy: float
+    problem: SurfaceProblem, y: NDArray[np.float64], step: NDArray[np.float64], energy: float
 ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], float] | None:
     """Longest of 1, 1/2, ... of the step that lowers the energy."""
     alpha = 1.0
@@ -253,7 +277,7 @@ def _search(
 
 
 def _draw(
-    problem: _Problem,
+    problem: SurfaceProblem,
     y: NDArray[np.float64],
     points: NDArray[np.float64],
     energy: float,

@@ -1,7 +1,7 @@
 """Registration of two solid tori, section 7.1: a volume-preserving map that takes landmarks to
 landmarks.
 
-The boundaries are laid on each other through their equal-area flat tori; the volume map from source
+The boundaries are laid on each other through their flat tori; the volume map from source
 to target then has its boundary prescribed.
 """
 
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._arrays import read_only
+from ._embed import EmbeddedBoundary, embed_boundary, unfold_boundary
 from ._flat import FlatSurface, Gauge, choose_gauge
 from ._match import affine_landmark_map, match_surfaces
 from .certificate import Certificate, certify
@@ -52,7 +53,8 @@ class Registration(MapResult):
     Attributes
     ----------
     solid : TetMesh
-        The source, refined if refinement was needed; the first vertices are those of the input.
+        The source, refined if refinement was needed, on the boundary, too; the first vertices are
+        those of the input.
     target : TetMesh
     image : ndarray, shape (n, 3)
         Image of each vertex; boundary vertices lie on the target's surface, landmarks on their
@@ -66,6 +68,10 @@ class Registration(MapResult):
     h : str
         ``"smooth"`` or ``"affine"``.
     refinement : Refinement or None
+        Of the source with its boundary edges split.
+    boundary_splits : int
+        Edges of the source's boundary that were split where it was too coarse: its image would
+        cross itself, or the affine map turn a face over.
     history : tuple of IterationRecord
         Stages ``"match"``, ``"vsem"``, ``"untangle"``, ``"frozen"``.
     distortion : Distortion
@@ -86,6 +92,7 @@ class Registration(MapResult):
     gauge: Gauge
     h: str
     refinement: Refinement | None = field(repr=False)
+    boundary_splits: int
     history: tuple[IterationRecord, ...] = field(repr=False)
     distortion: Distortion
     certificate: Certificate
@@ -104,6 +111,7 @@ class Registration(MapResult):
             "landmark_error": self.landmark_error,
             "snapped": float(snapped.max()) if snapped.size else 0.0,
             "gauge": dataclasses.asdict(self.gauge),
+            "boundary_splits": self.boundary_splits,
             "added_vertices": 0 if added is None else added.n_split,
             "added_tets": 0 if added is None else added.n_added_tets,
         }
@@ -143,7 +151,7 @@ def register(
         the landmarks, here a periodic one.
     max_iter : int
         Most steps of the surface matching, twice if landmarks are held in it. With 0 and
-        ``h="affine"`` the boundary map is the paper's, but for the flat tori's being equal-area.
+        ``h="affine"`` the boundary map is the paper's, but for the choice of the flat tori.
     tol : float
         Stop the surface matching when a step lowers its energy by no more than this share.
     keep_best : bool
@@ -188,11 +196,18 @@ def register(
     marks = _landmarks(landmarks, source, target)
     seconds: dict[str, float] = {}
     clock = time.perf_counter()
-    points, gauge, history = _boundary_map(source, target, marks, h, max_iter, tol, progress)
+    boundary, gauge, history = _boundary_map(source, target, marks, h, max_iter, tol, progress)
     seconds["boundary"] = time.perf_counter() - clock
+    if len(boundary.crossings) and not keep_best:
+        raise CertificationError(
+            f"{len(boundary.crossings)} pairs of faces of the boundary image cross, and refining "
+            "the source's boundary does not help: the surfaces differ too much; landmarks may "
+            "bring them together, keep_best=True returns the map all the same",
+            boundary.crossings.ravel(),
+        )
     return _fill(
-        source, target, points, marks, gauge, h, history, options or FlipFreeOptions(), solver,
-        keep_best, seconds, progress,
+        boundary, source.n_vertices, target, marks, gauge, h, history,
+        options or FlipFreeOptions(), solver, keep_best, seconds, progress,
     )  # fmt: skip
 
 
@@ -217,8 +232,8 @@ def _boundary_map(
     max_iter: int,
     tol: float,
     progress: Progress | None,
-) -> tuple[NDArray[np.float64], Gauge, tuple[IterationRecord, ...]]:
-    """Points of the target surface for the boundary vertices of the source."""
+) -> tuple[EmbeddedBoundary, Gauge, tuple[IterationRecord, ...]]:
+    """Points of the target surface for the boundary vertices of the source, refined if need be."""
     first, second = FlatSurface.of(source.surface), FlatSurface.of(target.surface)
     pairs = np.stack(
         [source.boundary_index[marks.source], target.boundary_index[marks.target]], axis=1
@@ -229,26 +244,27 @@ def _boundary_map(
     match = match_surfaces(
         first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
     )
-    points = match.points
+    y, points = match.y, match.points
     if h == "affine":
-        y = match.y
-        y = affine_landmark_map(y[pairs[:, 0]], second.turns[pairs[:, 1]], y)
-        folded = np.flatnonzero(~(_core.turn_areas(first.chart, np.ascontiguousarray(y)) > 0.0))
+        starts, ends = y[pairs[:, 0]], second.turns[pairs[:, 1]]
+        source, y, folded = unfold_boundary(
+            source, y, lambda at: affine_landmark_map(starts, ends, at)
+        )
         if len(folded):
             raise SolverError(
-                f"the source mesh is too coarse for the affine map: {len(folded)} faces turn over; "
-                "use h='smooth'",
+                f"the source mesh is too coarse for the affine map: {len(folded)} faces turn over, "
+                "and refining them does not help; use h='smooth'",
                 folded,
             )
         points = second.points(y)
     points[pairs[:, 0]] = second.surface.V[pairs[:, 1]]
-    return points, gauge, match.history
+    return embed_boundary(source, second, y, points, pairs[:, 0]), gauge, match.history
 
 
 def _fill(
-    source: TetMesh,
+    boundary: EmbeddedBoundary,
+    n_given: int,
     target: TetMesh,
-    points: NDArray[np.float64],
     marks: Landmarks,
     gauge: Gauge,
     h: str,
@@ -261,6 +277,8 @@ def _fill(
 ) -> Registration:
     """The volume map with the boundary prescribed."""
     clock = time.perf_counter()
+    source, points = boundary.solid, boundary.points
+    n_split = source.n_vertices - n_given
     refinement = refine_boundary_joins(source)
     solid, ids = refinement.solid, source.boundary_vertices
     enclosed = float(_core.enclosed_volume(points, source.surface.F))
@@ -311,6 +329,7 @@ def _fill(
         gauge=gauge,
         h=h,
         refinement=refinement if refinement.n_split else None,
+        boundary_splits=n_split,
         history=history + run.history + tuple(flip_free.history),
         distortion=distortion(solid, image),
         certificate=certificate,

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 import stretchmap as sm
 from stretchmap import _core, samples
+from stretchmap._embed import embed_boundary, unfold_boundary
 from stretchmap._flat import FlatSurface, Gauge, choose_gauge
 from stretchmap._match import affine_landmark_map
 from stretchmap.coordinates import PointMap
@@ -227,3 +228,109 @@ def test_saving(registered, tmp_path):
     assert np.array_equal(loaded.arrays["target_T"], registered.target.T)
     assert loaded.meta["landmarks"] == 30 and loaded.meta["certified"]
     assert "landmark error" in registered.summary()
+
+
+def thin_wall(thickness, n_tets=12_000):
+    """A short tube: the section of the solid torus pressed flat along the radius."""
+    solid = samples.solid_torus(n_tets)
+    x, y, z = solid.V.T
+    radius = np.hypot(x, y)
+    scale = (1.0 + thickness * (radius - 3.0)) / radius
+    return TetMesh(np.stack([x * scale, y * scale, z], axis=1), solid.T)
+
+
+def test_a_boundary_image_that_crosses_itself_is_refined():
+    """Chords of a coarse polygon leave the thin wall on the other side."""
+    source, target = samples.solid_torus(400), FlatSurface.of(thin_wall(0.02).surface)
+    y = FlatSurface.of(source.surface).turns
+    y = y + np.stack([0.04 * np.cos(2 * np.pi * y[:, 1]), 0.0 * y[:, 1]], axis=1)
+    points, n = target.points(y), len(y)
+    assert len(_core.crossing_faces(points, source.surface.F, 1000)) > 50
+    held = np.arange(0, n, 20, dtype=np.int32)
+    result = embed_boundary(source, target, y, points, held)
+    solid, surface = result.solid, result.solid.surface
+    assert not len(result.crossings)
+    assert not len(_core.crossing_faces(result.points, surface.F, 1000))
+    assert solid.n_vertices > source.n_vertices and solid.diagnose().ok
+    assert np.array_equal(solid.V[: source.n_vertices], source.V)
+    assert np.array_equal(result.points[held], points[held])
+    assert solid.volume == pytest.approx(source.volume, rel=1e-12)
+    assert surface.area == pytest.approx(source.surface.area, rel=1e-12)
+    assert surface_distance(result.points, target.surface).max() < 1e-9
+
+
+def test_faces_that_the_affine_map_turns_over_are_refined():
+    source = samples.solid_torus(3000)
+    y = FlatSurface.of(source.surface).turns
+
+    def shear(at):  # one to one, with a kink that coarse faces do not follow
+        across = 3.0 * (at[:, 1] - at[:, 0])
+        return at + 0.3 * np.abs(np.mod(across, 1.0) - 0.5)[:, None]
+
+    faces = source.surface.F
+    assert (flat_areas(shear(y), faces) <= 0.0).any()
+    solid, bent, folded = unfold_boundary(source, y, shear)
+    assert not len(folded) and (flat_areas(bent, solid.surface.F) > 0.0).all()
+    assert np.array_equal(bent[: len(y)], shear(y))
+    assert solid.diagnose().ok and solid.volume == pytest.approx(source.volume, rel=1e-12)
+
+
+def flat_areas(y, F):
+    sides = y[F[:, 1:]] - y[F[:, :1]]
+    return 0.5 * np.linalg.det(sides - np.round(sides))
+
+
+def test_flat_tori_have_no_squeezed_faces():
+    for surface in (samples.vertebra_like(6000).surface, thin_wall(0.2, 6000).surface):
+        flat = FlatSurface.of(surface)
+        shares = flat_areas(flat.turns, surface.F) * surface.area / surface.face_areas
+        assert shares.min() > 0.05 and shares.max() < 10.0
+
+
+def test_flat_derivatives_match_finite_differences():
+    surface = samples.torus_surface(24, 12)
+    flat = FlatSurface.of(surface)
+    lattice = np.array([[2.0, 0.3], [0.0, 0.5]])
+    rest = _core.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
+    weights = surface.face_areas / surface.area
+    y = flat.turns + 1e-3 * RNG.standard_normal(flat.turns.shape)
+    gradient, hessian = _core.flat_model(flat.chart, y, lattice, rest, weights)
+    assert np.abs(hessian - hessian.T).max() < 1e-12 * np.abs(hessian).max()
+    direction = RNG.standard_normal(y.shape)
+    difference = [
+        _core.flat_value(flat.chart, y + step * direction, lattice, rest, weights)
+        for step in (1e-7, -1e-7)
+    ]
+    slope = (difference[0] - difference[1]) / 2e-7
+    assert slope == pytest.approx(gradient @ direction.ravel(), rel=1e-5)
+
+
+def test_vertices_moved_one_by_one_lower_the_energy():
+    surface = samples.vertebra_like(6000).surface
+    flat = FlatSurface.of(surface)
+    rest = _core.rest_triangles(surface.V, surface.F, 1.0)
+    weights = surface.face_areas / surface.area
+    y = flat.turns + np.array([0.1, 0.05])
+    X = flat.points(y)
+    held = np.zeros(len(y), np.uint8)
+    held[::3] = 1
+    before = _core.match_value(flat.chart, y, X, rest, weights)
+    moved, there, _, gain, count = _core.relax_match(
+        flat.chart, flat.locator, surface.V, surface.F, flat.face_slopes, rest, weights, held, 2,
+        y, X, np.full(len(y), 0.02),
+    )  # fmt: skip
+    after = _core.match_value(flat.chart, moved, there, rest, weights)
+    assert count > 0 and gain > 0.0 and after == pytest.approx(before - gain, rel=1e-9)
+    assert np.array_equal(moved[::3], y[::3]) and np.allclose(flat.points(moved), there, atol=1e-12)
+
+
+def test_contradicting_landmarks_name_the_pair_with_the_smooth_map_too(pair):
+    a, b = pair.source_landmarks.copy(), pair.target_landmarks
+    near = cKDTree(pair.source.V[a]).query(pair.source.V[a], k=2)
+    first = int(np.argmin(near[0][:, 1]))
+    second = int(near[1][first, 1])
+    a[[first, second]] = a[[second, first]]
+    with pytest.raises(LandmarkError) as caught:
+        register(pair.source, pair.target, (a, b))
+    print(first, second, caught.value)
+    assert {first, second} & set(caught.value.ids)

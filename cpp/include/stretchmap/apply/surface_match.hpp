@@ -32,4 +32,13 @@ struct MatchModel {
 MatchModel match_model(const SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
                        const RowsRef& slopes, const RowsRef& rest, const VecRef& weights);
 
+// The same energy for the map into the plane, where the target is the flat torus itself: P_f is
+// lattice * E_f, the columns of `lattice` being the two periods.
+double flat_value(const SurfaceChart& chart, const Points2Ref& y, const Eigen::Matrix2d& lattice,
+                  const RowsRef& rest, const VecRef& weights);
+
+// \pre flat_value is finite.
+MatchModel flat_model(const SurfaceChart& chart, const Points2Ref& y,
+                      const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights);
+
 }  // namespace stretchmap
