@@ -24,11 +24,10 @@ System harmonic_system(const SolidTorus& solid) {
     fixed[i] = 1;
     x.row(i) = solid.standard.row(i);
   }
-  TetLaplacian laplacian(solid.tets, fixed);
+  TetLaplacian laplacian(solid.tets, fixed, signed_tet_volumes(solid.points, solid.tets));
   System system{laplacian.pattern(), {}};
   Points rhs;
-  const Vec coef = (9.0 * signed_tet_volumes(solid.points, solid.tets).array()).inverse();
-  laplacian.assemble(solid.points, coef, x, system.matrix, rhs);
+  laplacian.assemble(solid.points, 0.0, x, system.matrix, rhs);
   system.rhs = rhs;
   return system;
 }

@@ -43,16 +43,17 @@ void bind_volume(py::module_& m) {
           release_gil());
   m.def(
       "tet_laplacian",
-      [](const TetsRef& tets, const FlagsRef& fixed, const PointsRef& geometry, const VecRef& coef,
-         const PointsRef& x) {
-        TetLaplacian laplacian(tets, fixed);
+      [](const TetsRef& tets, const FlagsRef& fixed, const VecRef& rest, const PointsRef& geometry,
+         double c, const PointsRef& x, int lanes) {
+        TetLaplacian laplacian(tets, fixed, rest, lanes);
         SparseMatrix matrix = laplacian.pattern();
         Points rhs;
-        laplacian.assemble(geometry, coef, x, matrix, rhs);
-        return std::make_pair(std::move(matrix), std::move(rhs));
+        laplacian.assemble(geometry, c, x, matrix, rhs);
+        return std::make_tuple(std::move(matrix), std::move(rhs), laplacian.interior());
       },
-      py::arg("tets").noconvert(), py::arg("fixed").noconvert(), py::arg("geometry").noconvert(),
-      py::arg("coef"), py::arg("x").noconvert(), "L_II and -L_IB x_B as one pair, for checks.");
+      py::arg("tets").noconvert(), py::arg("fixed").noconvert(), py::arg("rest"),
+      py::arg("geometry").noconvert(), py::arg("c"), py::arg("x").noconvert(), py::arg("lanes") = 8,
+      "L_II, -L_IB x_B and the vertex of each row, for checks.");
   py::class_<EnergyWeights>(m, "EnergyWeights")
       .def(py::init([](double shape, double volume, double epsilon, double face) {
              return EnergyWeights{shape, volume, epsilon, face};

@@ -28,12 +28,18 @@ def boundary_flags(solid):
     return fixed
 
 
-def full_laplacian(V, T, coefficients, geometry=None):
-    """Every vertex free but one extra isolated one, so that L_II is all of L."""
-    matrix, _ = _core.tet_laplacian(
-        T, np.zeros(len(V), np.uint8), V if geometry is None else geometry, coefficients, V
-    )
-    return matrix
+def laplacian_pair(T, fixed, rest, geometry, c, x, **options):
+    """L_II and -L_IB x_B, rows in the order of the vertices."""
+    matrix, rhs, rows = _core.tet_laplacian(T, fixed, rest, geometry, c, x, **options)
+    order = np.argsort(rows)
+    assert (rows[order] == np.flatnonzero(fixed == 0)).all()
+    return sp.csr_matrix(matrix)[order][:, order], rhs[order]
+
+
+def full_laplacian(V, T, rest, geometry=None, c=0.0):
+    """Every vertex free, so that L_II is all of L."""
+    held = np.zeros(len(V), np.uint8)
+    return laplacian_pair(T, held, rest, V if geometry is None else geometry, c, V)[0]
 
 
 def dihedral_laplacian(V, T):
@@ -61,7 +67,7 @@ def dihedral_laplacian(V, T):
 
 def test_laplacian_is_libigls_and_the_dihedral_one(bumpy):
     V, T = bumpy.V, bumpy.T
-    ours = full_laplacian(V, T, 1.0 / (9.0 * bumpy.tet_volumes))
+    ours = full_laplacian(V, T, bumpy.tet_volumes)
     scale = np.abs(ours).max()
     assert np.abs(ours + igl.cotmatrix(V, T)).max() < 1e-12 * scale
     assert np.abs(ours - dihedral_laplacian(V, T)).max() < 1e-11 * scale
@@ -69,21 +75,44 @@ def test_laplacian_is_libigls_and_the_dihedral_one(bumpy):
 
 def test_laplacian_with_boundary_is_the_matching_part_of_the_full_one(bumpy):
     V, T = bumpy.V, bumpy.T
-    coefficients = 1.0 / (9.0 * bumpy.tet_volumes)
-    full = sp.csr_matrix(full_laplacian(V, T, coefficients))
+    rest = bumpy.tet_volumes
+    full = full_laplacian(V, T, rest)
     fixed = boundary_flags(bumpy)
     x = RNG.standard_normal(V.shape)
-    inner, rhs = _core.tet_laplacian(T, fixed, V, coefficients, x)
+    inner, rhs = laplacian_pair(T, fixed, rest, V, 0.0, x)
     free, held = np.flatnonzero(fixed == 0), np.flatnonzero(fixed)
     assert np.abs(inner - full[free][:, free]).max() < 1e-13 * np.abs(full).max()
     assert np.allclose(rhs, -full[free][:, held] @ x[held], atol=1e-12 * np.abs(full).max())
+
+
+def test_laplacian_does_not_depend_on_the_kernel_or_the_numbering():
+    # Enough vertices for several chunks, numbered at random, and a boundary that splits rows.
+    solid = samples.bumpy_torus(30000)
+    V, T, rest = solid.V, solid.T, solid.tet_volumes
+    shuffle = RNG.permutation(len(V))
+    V2, T2 = np.empty_like(V), shuffle[T].astype(np.int32)
+    V2[shuffle] = V
+    fixed, fixed2 = boundary_flags(solid), np.zeros(len(V), np.uint8)
+    fixed2[shuffle] = fixed
+    args = (T2, fixed2, rest, V2, 3.0, V2)
+    first, first_rhs = laplacian_pair(*args)
+    for lanes in (1, 4):
+        other, other_rhs = laplacian_pair(*args, lanes=lanes)
+        assert np.array_equal(first.data, other.data)
+        assert np.array_equal(first_rhs, other_rhs)
+    # Against the matrix of the mesh as it was numbered before.
+    plain, plain_rhs = laplacian_pair(T, fixed, rest, V, 3.0, V)
+    rank = np.argsort(shuffle[np.flatnonzero(fixed == 0)])
+    scale = np.abs(plain.data).max()
+    assert np.abs(plain[rank][:, rank] - first).max() < 1e-13 * scale
+    assert np.allclose(plain_rhs[rank], first_rhs, atol=1e-13 * scale)
 
 
 def test_stretch_energy_identities(bumpy):
     V, T = bumpy.V, bumpy.T
     f = V + 0.02 * RNG.standard_normal(V.shape)
     rest, image = bumpy.tet_volumes, _core.signed_tet_volumes(f, T)
-    L = full_laplacian(V, T, 1.0 / (9.0 * rest), geometry=f)
+    L = full_laplacian(V, T, rest, geometry=f)
     energy = _core.tet_stretch_energy(image, rest)
     assert energy == pytest.approx(0.5 * np.trace(f.T @ (L @ f)), rel=1e-12)
     assert energy == pytest.approx(1.5 * (image**2 / rest).sum(), rel=1e-14)
@@ -125,8 +154,9 @@ def test_vsem_step_solves_the_paper_system(bumpy, c):
     rest = bumpy.tet_volumes
     stretch = _core.VolumetricStretch(T, fixed, rest, "direct")
     moved, solved = stretch.step(x, c, 1e-12)
-    weights = 1.0 / (9.0 * (rest + c * np.abs(_core.signed_tet_volumes(x, T))))
-    L = sp.csr_matrix(full_laplacian(V, T, weights, geometry=x))
+    # (5.6) folded into the rest volumes.
+    regularised = rest + c * np.abs(_core.signed_tet_volumes(x, T))
+    L = full_laplacian(V, T, regularised, geometry=x)
     free, held = np.flatnonzero(fixed == 0), np.flatnonzero(fixed)
     expected = sp.linalg.spsolve(sp.csc_matrix(L[free][:, free]), -L[free][:, held] @ x[held])
     assert np.allclose(moved[free], expected, atol=1e-9)

@@ -6,20 +6,17 @@ namespace stretchmap {
 
 VolumetricStretch::VolumetricStretch(const TetsRef& tets, const FlagsRef& fixed,
                                      const VecRef& rest_volumes, std::string backend)
-    : tets_(tets),
-      rest_volumes_(rest_volumes),
-      laplacian_(tets, fixed),
-      wanted_backend_(std::move(backend)) {}
+    : laplacian_(tets, fixed, rest_volumes), wanted_backend_(std::move(backend)) {}
 
-SolveReport VolumetricStretch::solve(const PointsRef& geometry, const Vec& coef, Points& x,
+SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c, Points& x,
                                      const SolveOptions& options, const Poll& poll) {
   Points rhs;
   if (!solver_) {
     SparseMatrix matrix = laplacian_.pattern();
-    laplacian_.assemble(geometry, coef, x, matrix, rhs);
+    laplacian_.assemble(geometry, c, x, matrix, rhs);
     solver_ = std::make_unique<SpdSolver>(std::move(matrix), SpdOptions{wanted_backend_});
   } else {
-    laplacian_.assemble(geometry, coef, x, solver_->matrix(), rhs);
+    laplacian_.assemble(geometry, c, x, solver_->matrix(), rhs);
     solver_->refactor();
   }
   const IndexVec& interior = laplacian_.interior();
@@ -32,16 +29,12 @@ SolveReport VolumetricStretch::solve(const PointsRef& geometry, const Vec& coef,
 
 SolveReport VolumetricStretch::harmonic(const PointsRef& source, Points& x,
                                         const SolveOptions& options, const Poll& poll) {
-  const Vec coef = (9.0 * rest_volumes_.array()).inverse();
-  return solve(source, coef, x, options, poll);
+  return solve(source, 0.0, x, options, poll);
 }
 
 SolveReport VolumetricStretch::step(Points& x, double c, const SolveOptions& options,
                                     const Poll& poll) {
-  const Vec image = signed_tet_volumes(x, tets_);
-  const Vec coef = (9.0 * (rest_volumes_.array() + c * image.array().abs())).inverse();
-  const Points geometry = x;
-  return solve(geometry, coef, x, options, poll);
+  return solve(x, c, x, options, poll);
 }
 
 }  // namespace stretchmap

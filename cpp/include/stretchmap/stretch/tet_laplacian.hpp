@@ -7,55 +7,47 @@
 // since g_i . g_j = -|f_i| |f_j| cos(theta). The image volume of (5.3) cancels against the stretch
 // factor, so for c = 0 the matrix is polynomial in f and never singular.
 //
-// Assembly is a gather: each matrix row sums its own tets in a fixed order, so the values do not
-// depend on the number of threads.
+// Assembly sums the weights of every edge in a fixed order (tet_plan.hpp), several tets at once
+// where the processor can, and then copies each sum to its two matrix entries: the values depend
+// neither on the number of threads nor on the processor.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "stretchmap/base/types.hpp"
+#include "stretchmap/stretch/tet_plan.hpp"
 
 namespace stretchmap {
 
-using Flags = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>;
-using FlagsRef = Eigen::Ref<const Flags>;
-
 class TetLaplacian {
  public:
-  // fixed[i] != 0 marks vertices whose position is prescribed (the set B of Algorithm 5.1).
+  // fixed[i] != 0 marks vertices whose position is prescribed (the set B of Algorithm 5.1); rest
+  // (k) holds the positive volumes |tau|. lanes: most tets treated at once (8, 4 or 1), for checks.
   // \pre tets index into [0, fixed.size()).
-  TetLaplacian(const TetsRef& tets, const FlagsRef& fixed);
+  TetLaplacian(const TetsRef& tets, const FlagsRef& fixed, const VecRef& rest, int lanes = 8);
 
-  // A matrix with the pattern of L_II, to be owned by a solver, values unset.
+  // A matrix with the pattern of L_II, to be owned by a solver, values unset. Its rows are numbered
+  // for locality, see interior().
   SparseMatrix pattern() const;
 
-  // Writes L_II into the values of `matrix` and -L_IB x_B into `rhs`, L being the Laplacian with
-  // the area vectors of `geometry` (n, 3) and the factors `coef` (k). `x` (n, 3) supplies x_B. \pre
-  // matrix has the pattern of pattern().
-  void assemble(const PointsRef& geometry, const VecRef& coef, const PointsRef& x,
-                SparseMatrix& matrix, Points& rhs);
+  // Writes L_II into the values of `matrix` and -L_IB x_B into `rhs`, L being L_S of `geometry`
+  // (n, 3) with c >= 0; for the source as geometry and c = 0 that is L_D. `x` (n, 3) supplies x_B.
+  // \pre matrix has the pattern of pattern().
+  void assemble(const PointsRef& geometry, double c, const PointsRef& x, SparseMatrix& matrix,
+                Points& rhs);
 
-  const IndexVec& interior() const { return interior_; }  // vertex of each matrix row
+  const IndexVec& interior() const { return plan_.interior; }  // vertex of each matrix row
+
+  // What an assembly reads beside tets, volumes and positions: where each weight goes.
+  double index_bytes() const { return plan_.index_bytes(); }
 
  private:
-  void build_edges();
-  void build_rows(const FlagsRef& fixed);
+  void copy_rows(const PointsRef& x, SparseMatrix& matrix, Points& rhs) const;
 
-  Tets tets_;
-  Index n_vertices_;
-  Edges edges_;  // only while the pattern is built
-  IndexVec interior_;
-  std::vector<Index> outer_, inner_;  // the matrix pattern
-  std::vector<Index> diagonal_;       // position of each row's diagonal entry
-  std::vector<Index> edge_start_;     // per edge, its slots (6 * tet + local edge)
-  std::vector<Index> edge_slot_;
-  std::vector<Index> entry_edge_;    // per matrix entry its edge, -1 on the diagonal
-  std::vector<Index> couple_start_;  // per row, its prescribed neighbours
-  std::vector<Index> couple_edge_;
-  std::vector<Index> couple_vertex_;
-  std::vector<double> slot_weight_;  // scratch kept between calls
-  std::vector<double> edge_weight_;
+  TetPlan plan_;
+  int lanes_;
+  std::vector<double> x_;     // scratch kept between calls: positions, 4 numbers per vertex,
+  std::vector<double> sums_;  // and one number per edge
 };
 
 // Signed volumes (k) of the tets with vertex positions x (n, 3).

@@ -28,11 +28,9 @@ class VolumetricStretch {
   std::string backend() const { return solver_ ? solver_->backend() : std::string(); }
 
  private:
-  SolveReport solve(const PointsRef& geometry, const Vec& coef, Points& x,
-                    const SolveOptions& options, const Poll& poll);
+  SolveReport solve(const PointsRef& geometry, double c, Points& x, const SolveOptions& options,
+                    const Poll& poll);
 
-  Tets tets_;
-  Vec rest_volumes_;
   TetLaplacian laplacian_;
   std::string wanted_backend_;
   std::unique_ptr<SpdSolver> solver_;
