@@ -55,6 +55,10 @@ def cell(value: Any) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {cell(entry)}" for name, entry in value.items())
+    if isinstance(value, (list, tuple)):
+        return f"({', '.join(cell(entry) for entry in value)})"
     return format(value, ".6g") if isinstance(value, float) else str(value)
 
 

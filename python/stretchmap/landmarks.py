@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from . import _core
+from ._numbers import read_numbers
 from .errors import ArrayError, FileFormatError, LandmarkError, OptionError
 from .mesh import TetMesh
 
@@ -104,31 +104,15 @@ def read_landmarks(path: str | os.PathLike[str], source: TetMesh, target: TetMes
     Raises
     ------
     FileFormatError
-        If the rows are not like that.
+        If the rows are not like that; names the line at fault.
     LandmarkError, ArrayError
         As `Landmarks.of`.
     OSError
         If the file cannot be opened.
     """
-    with open(path, newline="", encoding="utf-8") as file:
-        rows = [[cell.strip() for cell in row] for row in csv.reader(file) if any(row)]
-
-    def numbers(row: list[str]) -> list[float] | None:
-        try:
-            return [float(cell) for cell in row]
-        except ValueError:
-            return None
-
-    if rows and numbers(rows[0]) is None:
-        rows = rows[1:]
-    table = [numbers(row) for row in rows]
-    widths = {len(row) for row in table if row is not None}
-    if None in table or not table or widths not in ({2}, {6}):
-        raise FileFormatError(
-            f"{path}: every row must hold two vertex ids or six coordinates, one landmark per row"
-        )
-    values = np.array(table, float)
-    if widths == {2}:
+    widths = {2: "vertex ids", 6: "coordinates in source and target"}
+    values = read_numbers(path, widths)
+    if values.shape[1] == 2:
         if (values != np.round(values)).any():
             raise FileFormatError(f"{path}: vertex ids must be whole numbers")
         return Landmarks.of(source, target, *values.T.astype(np.int64))

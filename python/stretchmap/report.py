@@ -30,7 +30,7 @@ _CAPTIONS = {
     "domain": "The boundary in the angles of the torus, with cells of the source.",
     "loops": "The shortest loops that bound inside and outside.",
 }
-_NESTED = ("versions", "certificate", "seconds", "torus", "certified", "gauge")
+_NESTED = ("versions", "certificate", "seconds", "torus", "certified")
 _MEANING = {
     "flips": "elements turned over",
     "ring_mean": "mean of the ratios per vertex, (6.3) or (6.5); 1 is ideal",
@@ -48,6 +48,7 @@ _MEANING = {
     "iterations": "steps of all stages",
     "torus": "radii of centre circle and tube, in the unit of the mesh",
     "landmark_error": "largest distance of a landmark from its counterpart, over the target's size",
+    "gauge": "how the flat tori of the two boundaries were laid on each other",
     "snapped": "largest distance of a landmark given as a point from its vertex",
     "added_vertices": "put in where the boundary alone decided about tets",
 }

@@ -104,7 +104,57 @@ def test_register_command_names_bad_landmarks(folder, capsys):
     code = run("register", folder / "a.npz", folder / "b.npz", "--landmarks", folder / "bad.csv",
                "-o", folder / "bad.npz")  # fmt: skip
     assert code == 2 and not (folder / "bad.npz").exists()
-    assert "two vertex ids or six coordinates" in capsys.readouterr().err
+    assert "bad.csv, line 2: 'x' is not a finite number" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "text, expected",
+    [
+        ("", "holds no numbers"),
+        ("source,target\n", "holds no numbers"),
+        ("1,2,3\n", "line 1: 3 entries"),
+        ("# ids\na,b\n\n1,2\n3,4,5,6,7,8\n", "line 5: 6 entries, but 2 before"),
+        ("1,nan\n", "line 1: 'nan' is not a finite number"),
+        ("1,1e400\n", "line 1: '1e400' is not a finite number"),
+        ("1.5,2\n", "whole numbers"),
+        ("99999999,0\n", "names no vertex"),
+        ("\xff", "not a readable CSV file"),
+    ],
+)
+def test_a_bad_table_of_landmarks_is_told_by_its_line(folder, capsys, text, expected):
+    (folder / "bad.csv").write_bytes(text.encode("latin-1"))
+    code = run("register", folder / "a.npz", folder / "b.npz", "--landmarks", folder / "bad.csv",
+               "-o", folder / "bad.npz")  # fmt: skip
+    assert code == 2 and expected in capsys.readouterr().err
+    assert not (folder / "bad.npz").exists()
+
+
+def test_coordinates_command(folder, bumpy_map, capsys):
+    out = folder / "coordinates.csv"
+    assert run("coordinates", folder / "map.npz", "-o", out) == 0
+    rows = np.loadtxt(out, delimiter=",", skiprows=1)
+    solid = bumpy_map.solid
+    assert np.array_equal(rows[:, :3], solid.V) and np.array_equal(rows[:, 3:6], bumpy_map.image)
+    assert np.allclose(bumpy_map.torus.xi(*rows[:, 6:].T), bumpy_map.image, atol=1e-12)
+    assert out.read_text().startswith("x,y,z,image_x,image_y,image_z,u,v,s\n")
+
+    inside = solid.V[solid.T[:4]].mean(axis=1)
+    np.savetxt(folder / "p.csv", [*inside, [99.0, 0.0, 0.0]], delimiter=",", header="x,y,z")
+    assert run("coordinates", folder / "map.npz", "--points", folder / "p.csv", "-o", out) == 0
+    assert "1 of 5 points lie outside the source" in capsys.readouterr().err
+    rows = np.loadtxt(out, delimiter=",", skiprows=1)
+    assert np.allclose(rows[:4, 3:6], bumpy_map.forward(inside), atol=1e-12)
+    assert np.isnan(rows[4, 3:]).all() and rows[4, 0] == 99.0
+
+    np.savetxt(folder / "q.csv", rows[:4, 3:6], delimiter=",")
+    arguments = ("coordinates", folder / "map.npz", "--inverse", "-o", out)
+    assert run(*arguments, "--points", folder / "q.csv") == 0
+    assert np.allclose(np.loadtxt(out, delimiter=",", skiprows=1)[:, :3], inside, atol=1e-9)
+    out.unlink()
+    assert run(*arguments) == 2 and "--points" in capsys.readouterr().err
+    (folder / "bad.csv").write_text("1,2,nan\n")
+    assert run(*arguments, "--points", folder / "bad.csv") == 2
+    assert "line 1: 'nan'" in capsys.readouterr().err and not out.exists()
 
 
 def test_partition_command(folder):
@@ -129,6 +179,8 @@ def test_resample_and_morph_commands(folder):
 
 def test_commands_refuse_maps_of_surfaces(folder, bumpy_map, capsys):
     sm.area_map(bumpy_map.solid.surface).save(folder / "surface.npz")
-    for command, output in (("partition", "x.npz"), ("resample", "x.vtu"), ("morph", "x.pvd")):
+    for command, output in (
+        ("partition", "x.npz"), ("resample", "x.vtu"), ("morph", "x.pvd"), ("coordinates", "x.csv"),
+    ):  # fmt: skip
         assert run(command, folder / "surface.npz", "-o", folder / output) == 2
         assert "map of a surface" in capsys.readouterr().err

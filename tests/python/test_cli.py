@@ -350,7 +350,8 @@ def test_help_names_every_command_and_version(capsys):
     assert main([]) == 0
     out = capsys.readouterr().out
     for command in ("info", "homology", "tet", "conformal", "area", "volume", "certify", "plot",
-                    "report", "demo"):  # fmt: skip
+                    "report", "demo", "coordinates", "register", "partition", "resample",
+                    "morph"):  # fmt: skip
         assert f"\n  {command} " in out
         assert main([command, "--help"]) == 0
     capsys.readouterr()

@@ -1,4 +1,4 @@
-"""Commands that use maps: register, partition, resample, morph."""
+"""Commands that use maps: coordinates, register, partition, resample, morph."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..errors import MeshError, OptionError
 from . import _common as common
 from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet
 from .maps import conclude
@@ -41,7 +42,7 @@ Target = Annotated[
 def register(app: typer.Typer) -> None:
     """Add the commands of this module."""
     app.command("register")(register_solids)
-    for command in (partition, resample, morph):
+    for command in (coordinates, partition, resample, morph):
         app.command()(command)
 
 
@@ -90,6 +91,53 @@ def register_solids(
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
         return 1
     return 0
+
+
+def coordinates(
+    map_file: MapFile,
+    output: Output,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV: x, y, z per row; the solid's vertices if left out.", show_default=False
+        ),
+    ] = None,
+    inverse: Annotated[
+        bool, typer.Option("--inverse", help="The points lie in the image, carry them back.")
+    ] = False,
+) -> None:
+    """Carry points through a map, with their solid-torus coordinates (.csv).
+
+    Each row holds a point of the source, its image, and u, v (radians) and s where the map has a
+    torus. A point outside the mesh has nan for what is not known.
+    """
+    import numpy as np
+
+    from .._numbers import read_numbers
+    from ..results import atomic_path
+
+    common.check_output(output, (".csv",), map_file, points)
+    result = _solid_map(map_file, "coordinates")
+    ends = [result.mesh.V, result.image]
+    if points is not None:
+        given = read_numbers(points, {3: "x, y, z"})
+        ends = [result.inverse(given), given] if inverse else [given, result.forward(given)]
+    elif inverse:
+        raise OptionError("--inverse carries points of the image back: give them by --points")
+    names = ["x", "y", "z", "image_x", "image_y", "image_z"]
+    if result.torus is not None:
+        names += ["u", "v", "s"]
+        known = np.isfinite(ends[0]).all(axis=1) & np.isfinite(ends[1]).all(axis=1)
+        angles = np.full_like(ends[1], np.nan)
+        angles[known] = np.stack(result.torus.coordinates(ends[1][known]), axis=-1)
+        ends.append(angles)
+    rows = np.hstack(ends)
+    outside = int(np.isnan(rows[:, :6]).any(axis=1).sum())
+    if outside:
+        where = "image" if inverse else "source"
+        _log.warning("%d of %d points lie outside the %s", outside, len(rows), where)
+    with atomic_path(output) as temporary:
+        np.savetxt(temporary, rows, "%.17g", ",", header=",".join(names), comments="")
 
 
 def partition(
@@ -170,7 +218,6 @@ def morph(
 
 
 def _solid_map(path: Path, command: str) -> LoadedMap:
-    from ..errors import MeshError
     from ..results import load_map
 
     loaded = load_map(path)
@@ -180,8 +227,6 @@ def _solid_map(path: Path, command: str) -> LoadedMap:
 
 
 def _shares(entry: str) -> int | list[float]:
-    from ..errors import OptionError
-
     try:
         values = [float(value) for value in entry.split(",")]
     except ValueError:
