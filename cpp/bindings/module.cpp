@@ -11,6 +11,7 @@ void bind_distortion(py::module_& m);
 void bind_area(py::module_& m);
 void bind_certificate(py::module_& m);
 void bind_apply(py::module_& m);
+void bind_threads(py::module_& m);
 }  // namespace stretchmap::bindings
 
 PYBIND11_MODULE(_core, m) {
@@ -36,4 +37,5 @@ PYBIND11_MODULE(_core, m) {
   bind_area(m);
   bind_certificate(m);
   bind_apply(m);
+  bind_threads(m);
 }

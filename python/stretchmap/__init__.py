@@ -40,6 +40,7 @@ _EXPORTS = {
     "holomorphic_forms": "forms",
     "conformal_map": "conformal",
     "area_map": "area",
+    "threads": "_threads",
     "volume_map": "volume",
     "distortion": "measures",
     "certify": "certificate",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from . import _core
 from ._area_stages import finish_areas, minimise_stretch, search_phase, start_angles
 from ._arrays import read_only
+from ._threads import takes_threads
 from .conformal import ConformalMap, conformal_map
 from .errors import OptionError
 from .measures import Distortion, distortion
@@ -100,6 +101,7 @@ class AreaMap(MapResult):
         return torus.xi(self.angles[:, 0], self.angles[:, 1])
 
 
+@takes_threads
 def area_map(
     surface: TriMesh,
     *,
@@ -113,6 +115,7 @@ def area_map(
     tol: float = 5e-3,
     shape_budget: float = 1.2,
     sem_iter: int = 10,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> AreaMap:
     """Map a genus-one surface onto a torus of revolution so that areas are preserved.
@@ -151,6 +154,8 @@ def area_map(
         is paid for with needles.
     sem_iter : int
         Most steps of stretch energy minimisation.
+    threads : int, optional
+        Threads to use, see `threads`; the result does not depend on it.
     progress : Progress, optional
         Called once per step.
 

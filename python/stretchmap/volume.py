@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._arrays import read_only
+from ._threads import takes_threads
 from .area import AreaMap, area_map
 from .certificate import Certificate, certify
 from .errors import ArrayError, CertificationError, DegenerateError, OptionError
@@ -113,6 +114,7 @@ class VolumeMap(MapResult):
         return {} if self.refinement is None else {"parent_tet": self.refinement.parent_tet}
 
 
+@takes_threads
 def volume_map(
     solid: TetMesh,
     *,
@@ -131,6 +133,7 @@ def volume_map(
     keep_best: bool = False,
     solver: str = "auto",
     options: FlipFreeOptions | None = None,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> VolumeMap:
     """Map a solid with a hole onto the solid torus, every piece keeping its volume.
@@ -180,6 +183,8 @@ def volume_map(
         Linear solver of the harmonic and fixed-point steps.
     options : FlipFreeOptions, optional
         Finer knobs of the certified route.
+    threads : int, optional
+        Threads to use, see `threads`; the result does not depend on it.
     progress : Progress, optional
         Called once per step.
 

@@ -35,6 +35,10 @@ Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.", s
 Json = Annotated[Path | None, typer.Option("--json", help="Write the figures as JSON.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No table and no progress bar.")]
 Orient = Annotated[bool, typer.Option("--orient", help="Turn elements oriented the wrong way.")]
+Threads = Annotated[
+    int | None,
+    typer.Option(help="Threads to use; the result does not depend on it.", show_default=False),
+]
 Compact = Annotated[bool, typer.Option("--compact", help="Drop points that no element uses.")]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from . import _common as common
-from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet
+from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet, Threads
 
 if TYPE_CHECKING:
     from ..certificate import Certificate
@@ -71,19 +71,22 @@ def register(app: typer.Typer) -> None:
 def conformal(
     input: Input,
     output: Output,
+    threads: Threads = None,
     json: Json = None,
     orient: Orient = False,
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> None:
     """Map a surface of genus one, or a solid's boundary, conformally onto a torus."""
+    from .._threads import threads as use_threads
     from ..conformal import conformal_map
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
     surface = common.surface_of(common.read_mesh(input, orient, compact))
     watch.lap("read")
-    result = conformal_map(surface)
+    with use_threads(threads):
+        result = conformal_map(surface)
     watch.lap(**result.seconds)
     conclude(result, output, json, quiet, watch)
 
@@ -101,6 +104,7 @@ def area(
     ] = None,
     ratio: Ratio = None,
     phase: Phase = None,
+    threads: Threads = None,
     json: Json = None,
     orient: Orient = False,
     compact: Compact = False,
@@ -123,7 +127,7 @@ def area(
     surface = common.surface_of(common.read_mesh(input, orient, compact))
     watch.lap("read")
     with terminal(quiet) as bar:
-        result = area_map(surface, **options, progress=bar)
+        result = area_map(surface, **options, threads=threads, progress=bar)
     watch.lap(**result.seconds)
     conclude(result, output, json, quiet, watch)
 
@@ -164,6 +168,7 @@ def volume(
         ),
     ] = False,
     solver: Annotated[Solver, typer.Option(help="Linear solver.")] = Solver.auto,
+    threads: Threads = None,
     json: Json = None,
     orient: Orient = False,
     compact: Compact = False,
@@ -189,7 +194,8 @@ def volume(
     with terminal(quiet) as bar:
         result = volume_map(
             solid, c=c, max_iter=max_iter, tol=tol, phase=phase,
-            vertex_exact=vertex_exact, refine=refine, keep_best=keep_best, progress=bar, **options,
+            vertex_exact=vertex_exact, refine=refine, keep_best=keep_best, threads=threads,
+            progress=bar, **options,
         )  # fmt: skip
     watch.lap(**result.seconds)
     conclude(result, output, json, quiet, watch)
