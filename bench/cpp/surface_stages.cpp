@@ -79,11 +79,10 @@ void surface_stages(const SolidTorus& solid, const Settings& settings, const Rep
   row.counters = {{"loops", generators.loops.size()}};
   report(row);
 
-  Rows linking;
+  LinkingMatrix linking;
   row = measure(name("homology.linking"),
                 [&] { linking = linking_matrix(s.topology, s.points, generators.loops); });
-  row.counters = {
-      {"off_integer", (linking.array() - linking.array().round()).cwiseAbs().maxCoeff()}};
+  row.counters = {{"intersection", std::abs(double(linking(0, 1) - linking(1, 0)))}};
   report(row);
 
   Loop loop;

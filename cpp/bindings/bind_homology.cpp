@@ -19,7 +19,10 @@ void bind_homology(py::module_& m) {
   m.def("periods", &periods, py::arg("topology"), py::arg("forms").noconvert(), py::arg("loop"),
         release_gil());
   m.def("wedge_matrix", &wedge_matrix, py::arg("topology"), py::arg("forms"), release_gil());
-  m.def("gauss_linking", &gauss_linking, py::arg("p"), py::arg("q"), release_gil());
+  m.def(
+      "linking_number",
+      [](const PointsRef& p, const PointsRef& q) { return linking_number(p, q, signal_poll()); },
+      py::arg("p"), py::arg("q"), release_gil());
   m.def(
       "linking_matrix",
       [](const SurfaceTopology& top, const PointsRef& points, const std::vector<Loop>& loops) {

@@ -26,7 +26,7 @@ def bounding_by_linking(
     surface lk(a, b outward) - lk(b, a outward) is minus the intersection number of a and b, each
     kind of class has rank g, and the two kinds meet in a unimodular matrix.
     """
-    linking = np.rint(_core.linking_matrix(surface.topology, surface.V, loops)).astype(np.int64)
+    linking = _core.linking_matrix(surface.topology, surface.V, loops)
     inside, outside = integer_kernel(linking.T), integer_kernel(linking)
     if not (
         2 * len(inside) == 2 * len(outside) == len(loops)

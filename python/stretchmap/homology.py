@@ -19,7 +19,7 @@ from . import _core
 from ._arrays import read_only
 from ._bounding import bounding_by_linking, bounding_in, least_skew_longitude, same_lattice
 from ._integer import integer_inverse, reduced_basis
-from .errors import ArrayError, GenusError, SelfIntersectionError, SolverError
+from .errors import ArrayError, GenusError, SelfIntersectionError
 from .forms import HarmonicForms, solve_harmonic
 from .results import atomic_path, table
 
@@ -292,7 +292,7 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
         linking, inside, tunnel = bounding_by_linking(surface, loops, intersection)
         if within is not None and not same_lattice(inside, within):
             raise SelfIntersectionError("the linking numbers contradict the solid")
-    except (SelfIntersectionError, SolverError) as error:
+    except SelfIntersectionError as error:
         if within is None:
             raise
         logger.warning("%s: the solid decides, loops that bound outside are left out", error)
