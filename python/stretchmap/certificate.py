@@ -299,7 +299,9 @@ def _volumes(
     bound = 8.0 * np.finfo(float).eps * (len(T) + len(F)) * box
     found.figures["image_volume"] = total
     found.figures["enclosed_volume"] = enclosed
-    found.figures["smallest_volume"] = float(volumes.min() / (abs(total) / len(T)))
+    found.figures["smallest_volume"] = (
+        float(volumes.min() / (abs(total) / len(T))) if total else math.nan
+    )
     found.note(
         "volume_enclosed",
         abs(total - enclosed) <= bound,

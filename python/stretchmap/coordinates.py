@@ -80,6 +80,8 @@ class PointMap:
     ------
     ArrayError
         If the map is that of a surface.
+    NonFiniteError
+        If the image has NaN or infinite coordinates.
     OptionError
         If the tolerance is negative or not finite.
 
@@ -95,7 +97,7 @@ class PointMap:
         if not (tolerance >= 0.0 and np.isfinite(tolerance)):
             raise OptionError(f"tolerance must be finite and not negative, got {tolerance}")
         self._T = result.mesh.T
-        self._ends = (result.mesh.V, np.ascontiguousarray(result.image))
+        self._ends = (result.mesh.V, as_points(result.image, "image"))
         self._tolerance = tolerance
         self._locators: list[_core.TetLocator | None] = [None, None]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,19 +85,23 @@ class Morph:
         raise FileFormatError(f"{path}: a morph is written as .pvd or .gif")
 
     def _save_frames(self, path: Path) -> list[Path]:
-        written, lines = [], []
-        for i, t in enumerate(self.times):
-            frame = path.with_name(f"{path.stem}_{i:03d}.vtu")
-            io.write(frame, TetMesh(self.frame(i), self.solid.T))
-            written.append(frame)
-            lines.append(f'    <DataSet timestep="{t:.6g}" file={quoteattr(frame.name)}/>')
+        frames = [path.with_name(f"{path.stem}_{i:03d}.vtu") for i in range(len(self.times))]
+        lines = [
+            f'    <DataSet timestep="{t:.6g}" file={quoteattr(frame.name)}/>'
+            for t, frame in zip(self.times, frames, strict=True)
+        ]
         text = "\n".join(
             ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>",
              *lines, "  </Collection>", "</VTKFile>", ""]
         )  # fmt: skip
-        with atomic_path(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-        return [*written, path]
+        with ExitStack() as stack:
+            # The frames appear together, once all of them are written.
+            for i, frame in enumerate(frames):
+                temporary = stack.enter_context(atomic_path(frame))
+                io.write(temporary, TetMesh(self.frame(i), self.solid.T))
+            with atomic_path(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+        return [*frames, path]
 
     def _save_picture(self, path: Path) -> list[Path]:
         try:
@@ -150,7 +155,7 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
     Raises
     ------
     OptionError
-        Fewer than two frames, or the map of a surface.
+        Fewer than two frames, the map of a surface, or an image that is a single point.
     """
     solid = result.mesh
     if not isinstance(solid, TetMesh):
@@ -158,6 +163,8 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
     if frames < 2:
         raise OptionError(f"a morph has at least two frames, got {frames}")
     image = np.asarray(result.image)
+    if not np.ptp(image, axis=0).any():
+        raise OptionError("the image is a single point")
     if align:
         from .landmarks import similarity
 

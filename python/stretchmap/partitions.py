@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 
 from . import _core
 from ._arrays import read_only
-from .errors import ArrayError, OptionError
+from .errors import ArrayError, OptionError, SolverError
 from .mesh import TetMesh, TriMesh
 from .results import plain, table
 from .torus import TWO_PI, Torus
@@ -204,6 +204,8 @@ def partition(
         If an option is out of range or the map has no torus.
     ArrayError
         If the map is that of a surface.
+    SolverError
+        If the image has no volume to be divided.
     """
     axes = (by,) if isinstance(by, str) else tuple(by)
     wanted = (fractions,) if isinstance(by, str) else tuple(fractions)  # type: ignore[arg-type]
@@ -346,9 +348,12 @@ def _sector_volume(pieces: _Pieces, axis: str, start: float, of: str) -> Callabl
 
 
 def _root(below: Callable[[float], float], target: float, ends: tuple[float, float]) -> float:
-    return float(
-        brentq(lambda level: below(level) - target, *ends, xtol=1e-15, rtol=4 * np.finfo(float).eps)
-    )
+    def excess(level: float) -> float:
+        return below(level) - target
+
+    if not excess(ends[0]) <= 0.0 <= excess(ends[1]):
+        raise SolverError("no level divides the image as asked; is the map certified?")
+    return float(brentq(excess, *ends, xtol=1e-15, rtol=4 * np.finfo(float).eps))
 
 
 def _cut_all(

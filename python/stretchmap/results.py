@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._arrays import as_points
 from ._output import atomic_path, plain, table, versions
 from .coordinates import CarriesPoints
 from .errors import FileFormatError
@@ -317,22 +318,27 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     FileFormatError
         If the file is not such an ``.npz``.
     MeshError
-        If the mesh in it is invalid.
+        If the mesh in it is invalid, or the image not finite.
     OSError
         If it cannot be opened.
     """
     from .mesh import TetMesh, TriMesh
 
+    with open(path, "rb") as stream:
+        if not zipfile.is_zipfile(stream):
+            raise FileFormatError(f"{path} is not a readable .npz file")
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = dict(file)
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
         raise FileFormatError(f"{path} is not a readable .npz file: {error}") from None
+    if "V" in arrays and "image" not in arrays and ("F" in arrays or "T" in arrays):
+        raise FileFormatError(f"{path} holds a mesh and no image of it: it has to be mapped first")
     missing = [key for key in ("V", "image") if key not in arrays]
     if missing or ("F" in arrays) == ("T" in arrays):
         raise FileFormatError(f"{path} must hold V, image and either F or T; it has {list(arrays)}")
     meta = _read_meta(path, arrays.pop("meta", None))
-    V, image = arrays.pop("V"), np.asarray(arrays.pop("image"), float)
+    V, image = arrays.pop("V"), as_points(arrays.pop("image"), "image")
     if image.shape != V.shape:
         raise FileFormatError(f"{path}: image has shape {image.shape}, V {V.shape}")
     solid = TetMesh(V, arrays.pop("T")) if "T" in arrays else None
@@ -347,7 +353,7 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
         torus=None if radii is None else Torus(*radii),
         arrays=arrays,
         meta=meta,
-        history=tuple(_read_record(record) for record in meta.get("history", ())),
+        history=_read_history(path, meta.get("history", [])),
         converged=bool(meta.get("converged", False)),
         stop_reason=str(meta.get("stop_reason", "read from a file")),
         seconds=meta.get("seconds", {}),
@@ -366,9 +372,15 @@ def _read_meta(path: object, meta: NDArray[Any] | None) -> dict[str, Any]:
     return value
 
 
-def _read_record(record: dict[str, Any]) -> IterationRecord:
+def _read_history(path: object, records: Any) -> tuple[IterationRecord, ...]:
     names = [f.name for f in dataclasses.fields(IterationRecord)]
-    return IterationRecord(**{k: NAN if record[k] is None else record[k] for k in names})
+    try:
+        return tuple(
+            IterationRecord(**{k: NAN if record[k] is None else record[k] for k in names})
+            for record in records
+        )
+    except (TypeError, KeyError, AttributeError) as error:
+        raise FileFormatError(f"{path}: the history in meta cannot be read: {error!r}") from None
 
 
 def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -165,7 +165,8 @@ def test_partition_command(folder):
     assert np.abs(report["errors"]).max() < 1e-12 and len(report["volumes"]) == 3
     assert run(*arguments, "--by", "u,s", "--fractions", "4:2") == 0
     assert len(json.loads((folder / "p.json").read_text())["volumes"]) == 8
-    assert run(*arguments, "--fractions", "many") == 2
+    for wrong in ("many", "nan", "inf", "0.2,nan", "1", "2.5", "0.5:0.5"):
+        assert run(*arguments, "--fractions", wrong) == 2
     assert run(*arguments, "--by", "x") == 2
 
 
@@ -175,6 +176,50 @@ def test_resample_and_morph_commands(folder):
     assert run("resample", folder / "map.npz", "-o", folder / "grid.stl") == 2
     assert run("morph", folder / "map.npz", "-o", folder / "m.pvd", "--frames", 3) == 0
     assert (folder / "m_002.vtu").exists()
+
+
+def test_frames_appear_together_or_not_at_all(bumpy_map, tmp_path, monkeypatch):
+    pytest.importorskip("meshio")
+    write = sm.io.write
+
+    def full(path, mesh):
+        if "002" in path.name:
+            raise OSError(28, "No space left on device", str(path))
+        write(path, mesh)
+
+    monkeypatch.setattr("stretchmap.io.write", full)
+    with pytest.raises(OSError):
+        morph(bumpy_map, 3).save(tmp_path / "m.pvd")
+    assert not list(tmp_path.iterdir())
+
+
+def test_register_command_names_the_mesh_at_fault(folder, capsys):
+    sm.write(folder / "ball.npz", samples.ball(3))
+    assert run("register", folder / "a.npz", folder / "ball.npz", "-o", folder / "x.npz") == 2
+    assert "ball.npz: the boundary of the solid has genus 0" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("damage", ["nan", "point"])
+def test_commands_refuse_broken_images(folder, capsys, damage):
+    with np.load(folder / "map.npz") as file:
+        arrays = dict(file)
+    arrays["image"][3:] = np.nan if damage == "nan" else arrays["image"][0]
+    arrays["image"][:3] = arrays["image"][3]
+    np.savez(folder / "broken.npz", **arrays)
+    for command, output, code in (
+        ("partition", "x.npz", 1), ("resample", "x.vtu", 1), ("morph", "x.pvd", 2),
+        ("plot", "x.png", 2), ("report", "x.html", 2), ("certify", None, 1),
+    ):  # fmt: skip
+        rest = () if output is None else ("-o", folder / output)
+        assert run(command, folder / "broken.npz", *rest) == (2 if damage == "nan" else code)
+        err = capsys.readouterr().err
+        assert err.startswith("stretchmap: error: ") and "internal" not in err, command
+        assert err.count("\n") == 1 and (output is None or not (folder / output).exists())
+
+
+def test_a_mesh_is_no_map(folder, capsys):
+    assert run("plot", folder / "a.npz", "-o", folder / "x.png") == 2
+    assert "a.npz holds a mesh and no image of it" in capsys.readouterr().err
 
 
 def test_commands_refuse_maps_of_surfaces(folder, bumpy_map, capsys):

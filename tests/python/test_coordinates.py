@@ -140,6 +140,10 @@ def test_a_million_points_take_seconds():
 
 
 def test_bad_input_is_named(bumpy_map):
+    broken = bumpy_map.image.copy()
+    broken[7] = np.nan
+    with pytest.raises(NonFiniteError, match="image"):
+        a_map(bumpy_map.solid, broken).inverse(bumpy_map.image)
     with pytest.raises(ArrayError):
         bumpy_map.forward(np.zeros((3, 2)))
     with pytest.raises(NonFiniteError):

@@ -12,7 +12,7 @@ import pytest
 
 from stretchmap import TetMesh, Torus, TriMesh, certify, distortion, read, samples
 from stretchmap.certificate import Certificate
-from stretchmap.errors import FileFormatError, IndexRangeError
+from stretchmap.errors import FileFormatError, IndexRangeError, MeshError
 from stretchmap.measures import Distortion
 from stretchmap.results import IterationRecord, MapResult, atomic_path, load_map, table
 
@@ -197,6 +197,8 @@ def test_unknown_format(solid_map, tmp_path):
         {"V": np.eye(3), "F": [[0, 1, 2]], "image": np.eye(3), "meta": "{"},
         {"V": np.eye(3), "F": [[0, 1, 2]], "image": np.eye(3), "meta": "[]"},
         {"V": np.eye(3), "F": [[0, 1, 2]], "image": np.eye(3), "torus": 1.0},
+        {"V": np.eye(3), "F": [[0, 1, 2]], "image": np.eye(3), "meta": '{"history": 5}'},
+        {"V": np.eye(3), "F": [[0, 1, 2]], "image": np.eye(3), "meta": '{"history": [{}]}'},
     ],
 )
 def test_files_that_are_no_maps(tmp_path, arrays):
@@ -204,6 +206,13 @@ def test_files_that_are_no_maps(tmp_path, arrays):
     np.savez(path, **arrays)
     with pytest.raises(FileFormatError):
         load_map(path)
+
+
+@pytest.mark.parametrize("image", [np.full((3, 3), np.nan), [["a"] * 3] * 3, np.eye(3)[0]])
+def test_images_that_are_no_points(tmp_path, image):
+    np.savez(tmp_path / "map.npz", V=np.eye(3), F=[[0, 1, 2]], image=image)
+    with pytest.raises(MeshError, match="image"):
+        load_map(tmp_path / "map.npz")
 
 
 def test_damaged_files(tmp_path):

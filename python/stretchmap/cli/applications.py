@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,7 @@ from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet
 from .maps import conclude
 
 if TYPE_CHECKING:
+    from ..mesh import TetMesh
     from ..results import LoadedMap
 
 _log = logging.getLogger("stretchmap")
@@ -76,10 +78,7 @@ def register_solids(
     inputs = [path for path in (input, target, landmarks) if path is not None]
     common.check_outputs(output, common.map_suffixes(), json, *inputs)
     watch = common.Stopwatch()
-    source, goal = (
-        common.require_solid(common.read_mesh(path, orient, compact), path, "register")
-        for path in (input, target)
-    )
+    source, goal = (_solid_torus(path, orient, compact) for path in (input, target))
     watch.lap("read")
     with terminal(quiet) as bar:
         result = register_meshes(
@@ -105,6 +104,7 @@ def coordinates(
     inverse: Annotated[
         bool, typer.Option("--inverse", help="The points lie in the image, carry them back.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Carry points through a map, with their solid-torus coordinates (.csv).
 
@@ -138,6 +138,8 @@ def coordinates(
         _log.warning("%d of %d points lie outside the %s", outside, len(rows), where)
     with atomic_path(output) as temporary:
         np.savetxt(temporary, rows, "%.17g", ",", header=",".join(names), comments="")
+    if not quiet:
+        typer.echo(f"{len(rows)} points, {outside} outside, written to {output}")
 
 
 def partition(
@@ -173,6 +175,7 @@ def partition(
     common.write_together(output, parts.save, json, parts.to_dict())
     if not quiet:
         typer.echo(parts.summary())
+        typer.echo(f"written to {output}")
 
 
 def resample(
@@ -195,6 +198,7 @@ def resample(
     common.write_together(output, mesh.save, json, mesh.to_dict())
     if not quiet:
         typer.echo(mesh.summary())
+        typer.echo(f"written to {output}")
     if mesh.n_negative:
         _log.error("%d hexahedra have a corner that is not positive", mesh.n_negative)
         return 1
@@ -212,9 +216,21 @@ def morph(
 
     common.check_output(output, (".pvd", ".gif"), map_file)
     result = homotopy(_solid_map(map_file, "morph"), frames)
-    result.save(output)
+    written = result.save(output)
     if not quiet:
         typer.echo(result.summary())
+        frames = f" with {len(written) - 1} frames beside it" if len(written) > 1 else ""
+        typer.echo(f"written to {output}{frames}")
+
+
+def _solid_torus(path: Path, orient: bool, compact: bool) -> TetMesh:
+    """One of two meshes; what is wrong with it is told with its name."""
+    mesh = common.require_solid(common.read_mesh(path, orient, compact), path, "register")
+    try:
+        mesh.require_solid_torus()
+    except MeshError as error:
+        raise type(error)(f"{path}: {error}", error.ids) from None
+    return mesh
 
 
 def _solid_map(path: Path, command: str) -> LoadedMap:
@@ -231,6 +247,8 @@ def _shares(entry: str) -> int | list[float]:
         values = [float(value) for value in entry.split(",")]
     except ValueError:
         raise OptionError(f"--fractions must hold numbers, got {entry!r}") from None
+    if not all(map(math.isfinite, values)):
+        raise OptionError(f"--fractions must hold finite numbers, got {entry!r}")
     if len(values) == 1 and values[0] == int(values[0]):
         return int(values[0])
     return values

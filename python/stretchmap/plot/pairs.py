@@ -27,8 +27,8 @@ def registration(result: MapResult) -> Figure:
 
     The colour is the position along the longest axis of the source, on the target that of the point
     carried there. Dots are landmarks; rings are where the map carries those of the source, so that
-    a ring without a dot in it is an error. Without landmarks points far from each other are
-    carried.
+    a ring without a dot in it is an error. Numbers are those of the rows of landmarks, from 0 on.
+    Without landmarks points far from each other are carried.
 
     Parameters
     ----------
@@ -42,6 +42,8 @@ def registration(result: MapResult) -> Figure:
     ------
     OptionError
         The map is no registration.
+    LandmarkError
+        The landmarks are not vertices of the two boundaries.
     MissingDependencyError
         matplotlib is not installed.
     """
@@ -51,12 +53,14 @@ def registration(result: MapResult) -> Figure:
     figure = empty_figure(9.6, 8.4)
     from matplotlib.lines import Line2D
 
-    from ..landmarks import similarity
+    from ..landmarks import Landmarks, similarity
 
     image = np.asarray(result.image)
     skin, ids = solid.surface, solid.boundary_vertices
     pairs = np.asarray(result.extra_arrays().get("landmarks", np.zeros((0, 2), np.int32)))
     marks = pairs[:, 0] if len(pairs) else ids[_far_apart(skin.V, _FREE)]
+    if len(pairs):
+        Landmarks.of(solid, target, *pairs.T)  # refuses what a file may hold
     goals = target.V[pairs[:, 1]] if len(pairs) else image[marks]
     colours = along(solid.V, solid.V)
     faces = ids[skin.F]
@@ -102,7 +106,7 @@ def _mark(axes: Axes, at: Array, colours: Array, seen: NDArray[np.intp]) -> None
     for i, place in zip(seen, _out_of_the_way(at[seen] / width) * width, strict=True):
         axes.plot(*np.stack([at[i], place]).T, color=BLACK, linewidth=0.5, zorder=2)
         axes.text(
-            *place, str(i + 1), fontsize=8, ha="center", va="center", zorder=4,
+            *place, str(i), fontsize=8, ha="center", va="center", zorder=4,
             path_effects=[withStroke(linewidth=2.5, foreground="white")],
         )  # fmt: skip
 

@@ -139,11 +139,10 @@ def levels(
     shades = steps(parts.n_parts)
     ends = (("source", pieces.source, view), (_TORUS, pieces.image, _torus_view(front)))
     _side_by_side(figure, ends, faces, shades[pieces.parent[tets]])
-    kind = {"s": "shell", "u": "sector", "v": "sector"}[by]
     columns = math.ceil(parts.n_parts / math.ceil(parts.n_parts / 5))
     figure.legend(
         handles=[
-            Patch(color=shade, label=f"{kind} {i + 1}: {100 * share:.3g} %")
+            Patch(color=shade, label=f"part {i}: {100 * share:.3g} %")
             for i, (shade, share) in enumerate(zip(shades, parts.fractions, strict=True))
         ],
         title="share of the volume" + (", from the core outwards" if by == "s" else ""),
