@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _core, io
 from ._arrays import read_only
-from .errors import FileFormatError, MissingDependencyError, OptionError
+from .errors import FileFormatError, OptionError
 from .mesh import TetMesh
 from .results import atomic_path, plain, table
 
@@ -104,28 +104,24 @@ class Morph:
         return [*frames, path]
 
     def _save_picture(self, path: Path) -> list[Path]:
-        try:
-            from matplotlib.animation import FuncAnimation, PillowWriter
-            from matplotlib.backends.backend_agg import FigureCanvasAgg
-            from matplotlib.figure import Figure
-        except ImportError:
-            raise MissingDependencyError(
-                "animated pictures need matplotlib: pip install 'stretchmap[plot]'"
-            ) from None
-        figure = Figure(figsize=(5, 5))
-        FigureCanvasAgg(figure)
-        axes = figure.add_subplot(projection="3d")
+        from .plot._painting import Scene
+        from .plot._style import along, broad_view, empty_figure
+
+        figure = empty_figure(5.0, 4.6)
+        from matplotlib.animation import FuncAnimation, PillowWriter
+
+        axes = figure.add_subplot()
         ids, faces = self.solid.boundary_vertices, self.solid.surface.F
-        corners = np.concatenate([self.solid.V[ids], self.image[ids]])
-        low, high = corners.min(axis=0), corners.max(axis=0)
+        start = self.solid.V[ids]
+        around = np.concatenate([start, self.image[ids]])
+        colours = along(start[faces].mean(axis=1), start)
 
         def draw(i: int) -> list[Any]:
             axes.clear()
-            axes.set_axis_off()
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-            axes.set_box_aspect(high - low)
-            points = self.frame(i)[ids]
-            return [axes.plot_trisurf(*points.T, triangles=faces, color="#5b8fb9", linewidth=0)]
+            scene = Scene(broad_view(start))
+            scene.add_faces(self.frame(i)[ids][faces], colours)
+            scene.draw(axes, around)
+            return [axes.set_title(f"t = {self.times[i]:.2f}", fontsize=10)]
 
         # There and back, so that the end meets the beginning.
         order = [*range(len(self.times)), *range(len(self.times) - 2, 0, -1)]

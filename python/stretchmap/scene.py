@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import ArrayError, FileFormatError, MissingDependencyError, OptionError
 from .mesh import TetMesh, TriMesh
+from .plot._style import principal
 from .results import MapResult, atomic_path
 
 if TYPE_CHECKING:
@@ -36,8 +37,7 @@ def cut(
     result : MapResult
         A map of a solid.
     colour : {"coordinate", "ratio"}
-        By the position along the longest side of the source's bounding box, or by the volume ratio
-        of each tet.
+        By the position along the longest axis of the source, or by the volume ratio of each tet.
     off_screen : bool
         Draw without a window.
 
@@ -60,17 +60,18 @@ def cut(
         raise OptionError(f"colour must be one of {', '.join(_COLOURS)}, got {colour!r}")
     pv = _pyvista()
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: result.mesh.T}, np.asarray(result.image))
-    along = int(np.ptp(result.mesh.V, axis=0).argmax())
-    grid.point_data["coordinate"] = result.mesh.V[:, along]
+    place = principal(result.mesh.V, result.mesh.V)[:, 0]
+    grid.point_data["coordinate"] = place
     grid.cell_data["ratio"] = result.distortion.ratios
     half = grid.clip("y", origin=(0.0, 0.0, 0.0), invert=False)
     table, limits = _COLOURS[colour]
     plotter = pv.Plotter(off_screen=off_screen)
     # The line break keeps the title off the numbers below it.
-    title = (f"source {'xyz'[along]}" if colour == "coordinate" else "volume ratio") + "\n"
+    title = ("place in the source" if colour == "coordinate" else "volume ratio") + "\n"
     plotter.add_mesh(
-        half, scalars=colour, cmap=table, clim=limits, scalar_bar_args={"title": title}
-    )
+        half, scalars=colour, cmap=table, clim=limits or (place.min(), place.max()), ambient=0.3,
+        scalar_bar_args={"title": title, "position_x": 0.2, "position_y": 0.01, "height": 0.11},
+    )  # fmt: skip
     _look(plotter)
     return plotter
 
@@ -111,8 +112,9 @@ def loops(mesh: TriMesh | TetMesh, *, off_screen: bool = True) -> pyvista.Plotte
     for name, shade, found in families:
         for loop in found:
             plotter.add_mesh(
-                _ring(pv, surface.V[loop]), color=shade, line_width=6, label=f"{name} loop"
-            )
+                _ring(pv, surface.V[loop]), color=shade, line_width=9, label=f"{name} loop",
+                render_lines_as_tubes=True,
+            )  # fmt: skip
     plotter.add_legend(bcolor="white", size=(0.2, 0.08 * len(families)))
     _look(plotter)
     return plotter
@@ -154,7 +156,7 @@ def _look(plotter: Any) -> None:
     plotter.camera.elevation = 35.0
     plotter.camera.azimuth = -20.0
     plotter.reset_camera()
-    plotter.camera.zoom(1.3)
+    plotter.camera.zoom(1.1)
 
 
 def _pyvista() -> Any:

@@ -253,6 +253,18 @@ def test_a_point_behind_a_face_is_not_seen():
     assert scene.visible(points, 0.1).tolist() == [False, True, True, True]
 
 
+def test_a_scene_can_leave_room_for_what_comes_later():
+    scene = Scene(View(elevation=90.0, azimuth=-90.0))
+    scene.add_faces(
+        np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]), np.ones((1, 3))
+    )
+    axes = empty_figure(1.0, 1.0).add_subplot()
+    scene.draw(axes, np.array([[-4.0, -1.0, 0.0], [6.0, 3.0, 9.0]]))
+    assert np.mean(axes.get_xlim()) == pytest.approx(1.0)
+    assert np.mean(axes.get_ylim()) == pytest.approx(1.0)
+    assert np.ptp(axes.get_xlim()) == pytest.approx(10.6)
+
+
 def test_opposite_views_see_opposite_sides():
     view = View(31.0, 17.0)
     assert np.allclose(view.opposite().axes[2], -view.axes[2])

@@ -135,8 +135,8 @@ class Scene:
             seen[i] = not ((weights >= 0.0).all(axis=1) & (above > 0.0)).any()
         return seen
 
-    def draw(self, axes: Axes) -> None:
-        """Paint everything, the farthest first, and fit the axes to it."""
+    def draw(self, axes: Axes, around: Array | None = None) -> None:
+        """Paint everything, the farthest first, and fit the axes to it, or to other points (n, 3)."""
         from matplotlib.collections import PolyCollection
 
         polygons, colours = np.concatenate(self._polygons), np.concatenate(self._colours)
@@ -153,7 +153,8 @@ class Scene:
         )
         for line, colour in self._outlines:
             axes.plot(*line.T, ":", color=colour, linewidth=1.2)
-        low, high = polygons.min(axis=(0, 1)), polygons.max(axis=(0, 1))
+        shown = polygons.reshape(-1, 2) if around is None else around @ self.view.axes[:2].T
+        low, high = shown.min(axis=0), shown.max(axis=0)
         width, height = high - low
         width = 1.06 * max(width, height / _HEIGHT)
         x, y = 0.5 * (low + high)
