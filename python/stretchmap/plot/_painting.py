@@ -136,7 +136,7 @@ class Scene:
         return seen
 
     def draw(self, axes: Axes, around: Array | None = None) -> None:
-        """Paint everything, the farthest first, and fit the axes to it, or to other points (n, 3)."""
+        """Paint everything, the farthest first; fit the axes to it or to other points (n, 3)."""
         from matplotlib.collections import PolyCollection
 
         polygons, colours = np.concatenate(self._polygons), np.concatenate(self._colours)
