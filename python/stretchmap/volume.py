@@ -13,19 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
 from ._arrays import read_only
 from ._threads import takes_threads
+from ._volume_stages import SolidProblem, SolidRun, certified_route, vsem_route
 from .area import AreaMap, area_map
 from .certificate import Certificate, certify
-from .errors import ArrayError, CertificationError, DegenerateError, OptionError
-from .flip_free import FlipFreeOptions, FlipFreeSolver
+from .errors import CertificationError, DegenerateError, OptionError
+from .flip_free import FlipFreeOptions
 from .measures import Distortion, distortion
 from .progress import Progress
 from .refine import Refinement, boundary_joins, refine_boundary_joins
 from .results import IterationRecord, MapResult
 from .torus import Torus
-from .vsem import minimise_volumetric_stretch
 
 if TYPE_CHECKING:
     from .mesh import TetMesh
@@ -33,9 +32,6 @@ if TYPE_CHECKING:
 __all__ = ["VolumeMap", "volume_map"]
 
 _log = logging.getLogger("stretchmap")
-
-# Before untangling, a few regularised steps (5.6) remove most flips of the harmonic map for little.
-_WARM_STEPS, _WARM_C = 3, 10.0
 
 # Peak resident bytes per tet of a whole call, mesh and result included, rounded up from what was
 # measured on generated solid tori of 1e6 tets: 594 and 1261 (493 for "vsem" at 1e7).
@@ -246,72 +242,28 @@ def volume_map(
         else:
             _refuse_joins(solid)
         seconds["refine"] = time.perf_counter() - clock
-    problem = _Problem.build(solid, refinement, boundary_map, start, torus)
-    if not certified:
-        return _vsem_map(problem, c or 0.0, max_iter, tol, solver, boundary_map, seconds, progress)
-    options = _with_overrides(options or FlipFreeOptions(), max_iter, tol)
-    return _certified_map(
-        problem, boundary or "glide", vertex_exact, options, solver, boundary_map, refinement,
-        keep_best, seconds, progress,
-    )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Problem:
-    """Source and torus on one scale: the polyhedron the boundary image encloses has volume 1."""
-
-    solid: TetMesh
-    V: NDArray[np.float64]
-    x: NDArray[np.float64]
-    torus: Torus
-    scale: float  # lengths of the result per length here
-    warm: bool  # x is a whole map, not only its boundary
-
-    @classmethod
-    def build(
-        cls,
-        solid: TetMesh,
-        refinement: Refinement | None,
-        boundary_map: AreaMap | None,
-        start: ArrayLike | None,
-        torus: Torus | None,
-    ) -> _Problem:
-        mesh = solid if refinement is None else refinement.solid
-        ids = solid.boundary_vertices
-        if start is not None:
-            assert torus is not None
-            image = np.array(start, dtype=np.float64)
-            if image.shape != solid.V.shape:
-                raise ArrayError(f"start must have shape {solid.V.shape}, got {image.shape}")
-            x = image if refinement is None else refinement.prolong(image)
-        else:
-            assert boundary_map is not None
-            torus = boundary_map.torus
-            x = np.zeros((mesh.n_vertices, 3))
-            x[ids] = boundary_map.image
-        enclosed = _enclosed_volume(x[ids], solid.surface.F)
-        if not enclosed > 0.0:
-            raise DegenerateError("the boundary image encloses no volume; is it inside out?")
-        shrink = enclosed ** (-1.0 / 3.0)
-        scale = solid.volume ** (1.0 / 3.0)
-        V = (mesh.V - mesh.V.mean(axis=0)) / scale
-        return cls(mesh, V, x * shrink, torus.scaled(shrink), scale, start is not None)
-
-    @property
-    def fixed(self) -> NDArray[np.uint8]:
-        flags = np.zeros(self.solid.n_vertices, np.uint8)
-        flags[self.solid.boundary_vertices] = 1
-        return flags
-
-    def result_scale(self, x: NDArray[np.float64]) -> float:
-        """Factor that gives the image the volume of the source."""
-        volume = float(_core.signed_tet_volumes(x, self.solid.T).sum())
-        return self.scale * volume ** (-1.0 / 3.0)
-
-
-def _enclosed_volume(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+    problem = SolidProblem.build(solid, refinement, boundary_map, start, torus)
+    if certified:
+        boundary = boundary or "glide"
+        run = certified_route(
+            problem, _with_overrides(options or FlipFreeOptions(), max_iter, tol),
+            glide=boundary == "glide", vertex_exact=vertex_exact, solver=solver, progress=progress,
+        )  # fmt: skip
+    else:
+        boundary = "frozen"
+        run = vsem_route(
+            problem, c=c or 0.0, max_iter=20 if max_iter is None else max_iter,
+            tol=1e-6 if tol is None else tol, solver=solver, progress=progress,
+        )  # fmt: skip
+    result = _result(problem, run, method, boundary, boundary_map, refinement, seconds)
+    if certified and not result.certificate.certified and not keep_best:
+        ids = next(iter(result.certificate.ids.values()), ())
+        raise CertificationError(
+            f"the map is not certified: {result.certificate.reason}; keep_best=True returns it all "
+            "the same",
+            ids,
+        )
+    return result
 
 
 def _check_options(
@@ -365,137 +317,23 @@ def _refuse_joins(solid: TetMesh) -> None:
         )
 
 
-def _vsem_map(
-    problem: _Problem,
-    c: float,
-    max_iter: int | None,
-    tol: float | None,
-    solver: str,
-    boundary_map: AreaMap | None,
-    seconds: dict[str, float],
-    progress: Progress | None,
-) -> VolumeMap:
-    clock = time.perf_counter()
-    run = minimise_volumetric_stretch(
-        problem.V,
-        problem.solid.T,
-        problem.fixed,
-        problem.x,
-        c=c,
-        max_iter=20 if max_iter is None else max_iter,
-        tol=1e-6 if tol is None else tol,
-        harmonic=not problem.warm,
-        solver=solver,
-        progress=progress,
-    )
-    seconds["vsem"] = time.perf_counter() - clock
-    return _finish(
-        problem, run.image, "vsem", "frozen", boundary_map, None, run.history, run.converged,
-        run.stop_reason, seconds,
-    )  # fmt: skip
-
-
-def _certified_map(
-    problem: _Problem,
-    boundary: str,
-    vertex_exact: bool,
-    options: FlipFreeOptions,
-    solver: str,
-    boundary_map: AreaMap | None,
-    refinement: Refinement | None,
-    keep_best: bool,
-    seconds: dict[str, float],
-    progress: Progress | None,
-) -> VolumeMap:
-    solid, x = problem.solid, problem.x
-    history: tuple[IterationRecord, ...] = ()
-    if not problem.warm:
-        clock = time.perf_counter()
-        run = minimise_volumetric_stretch(
-            problem.V, solid.T, problem.fixed, x, c=_WARM_C, max_iter=_WARM_STEPS, tol=0.0,
-            solver=solver, progress=progress,
-        )  # fmt: skip
-        x, history = run.image, run.history
-        seconds["vsem"] = time.perf_counter() - clock
-    flip_free = FlipFreeSolver(
-        V=problem.V,
-        T=solid.T,
-        boundary=solid.boundary_vertices,
-        faces=solid.boundary_vertices[solid.surface.F],
-        R=problem.torus.R,
-        r=problem.torus.r,
-        options=options,
-        progress=progress,
-    )
-    clock = time.perf_counter()
-    glide = boundary == "glide"
-    x, flips = flip_free.untangle(x, glide=glide)
-    seconds["untangle"] = time.perf_counter() - clock
-    converged, stop_reason = False, f"{flips} tets and faces could not be untangled"
-    if flips == 0:
-        clock = time.perf_counter()
-        goal = options.frozen_weight if glide else options.volume_weight
-        if not (problem.warm and glide):
-            first = options.volume_weight if problem.warm else 1.0
-            x, converged, stop_reason = flip_free.minimise(x, glide=False, start=first, goal=goal)
-            seconds["frozen"] = time.perf_counter() - clock
-        if glide:
-            clock = time.perf_counter()
-            first = options.volume_weight if problem.warm else goal
-            x, converged, stop_reason = flip_free.minimise(
-                x, glide=True, start=first, goal=options.volume_weight
-            )
-            seconds["glide"] = time.perf_counter() - clock
-    exact = False
-    if flips == 0:
-        clock = time.perf_counter()
-        equalised = flip_free.equalise(x, glide=glide)
-        if certify(solid, equalised, problem.torus).certified:
-            x = equalised
-        else:
-            _log.warning("volumes along u, v and s left as they were: the boundary would fold")
-        seconds["equalise"] = time.perf_counter() - clock
-    if flips == 0 and vertex_exact:
-        clock = time.perf_counter()
-        x, exact, reason = flip_free.make_rings_exact(x)
-        seconds["exact"] = time.perf_counter() - clock
-        if not exact:
-            _log.warning("ring volumes left as they were: %s", reason)
-    result = _finish(
-        problem, x, "certified", boundary, boundary_map, refinement,
-        history + tuple(flip_free.history), converged, stop_reason, seconds, exact,
-    )  # fmt: skip
-    if not result.certificate.certified and not keep_best:
-        ids = next(iter(result.certificate.ids.values()), ())
-        raise CertificationError(
-            f"the map is not certified: {result.certificate.reason}; keep_best=True returns it all "
-            "the same",
-            ids,
-        )
-    return result
-
-
-def _finish(
-    problem: _Problem,
-    x: NDArray[np.float64],
+def _result(
+    problem: SolidProblem,
+    run: SolidRun,
     method: str,
     boundary: str,
     boundary_map: AreaMap | None,
     refinement: Refinement | None,
-    history: tuple[IterationRecord, ...],
-    converged: bool,
-    stop_reason: str,
     seconds: dict[str, float],
-    vertex_exact: bool = False,
 ) -> VolumeMap:
-    scale = problem.result_scale(x)
-    image, torus = x * scale, problem.torus.scaled(scale)
+    scale = problem.result_scale(run.x)
+    image, torus = run.x * scale, problem.torus.scaled(scale)
     clock = time.perf_counter()
     figures = distortion(problem.solid, image)
     certificate = certify(problem.solid, image, torus)
-    seconds["certificate"] = time.perf_counter() - clock
-    if not converged:
-        _log.warning("volume map not converged: %s", stop_reason)
+    seconds = {**seconds, **run.seconds, "certificate": time.perf_counter() - clock}
+    if not run.converged:
+        _log.warning("volume map not converged: %s", run.stop_reason)
     if figures.flips:
         _log.warning("volume map has %d flipped tets", figures.flips)
     return VolumeMap(
@@ -506,11 +344,11 @@ def _finish(
         boundary=boundary,
         boundary_map=boundary_map,
         refinement=refinement if refinement is not None and refinement.n_split else None,
-        history=history,
+        history=run.history,
         distortion=figures,
         certificate=certificate,
-        converged=converged,
-        stop_reason=stop_reason,
+        converged=run.converged,
+        stop_reason=run.stop_reason,
         seconds=seconds,
-        vertex_exact=vertex_exact,
+        vertex_exact=run.vertex_exact,
     )
