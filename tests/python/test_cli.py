@@ -349,6 +349,7 @@ def test_demo_needs_no_data(tmp_path, capsys):
 def test_help_names_every_command_and_version(capsys):
     assert main([]) == 0
     out = capsys.readouterr().out
+    assert "..." not in out.split("Commands:")[1]
     for command in ("info", "homology", "tet", "conformal", "area", "volume", "certify", "plot",
                     "report", "demo", "coordinates", "register", "partition", "resample",
                     "morph"):  # fmt: skip

@@ -29,13 +29,6 @@ class Spread(str, Enum):
     affine = "affine"
 
 
-class Conserve(str, Enum):
-    """Values of ``--conserve``."""
-
-    integral = "integral"
-    mean = "mean"
-
-
 Target = Annotated[
     Path, typer.Argument(metavar="TARGET", help="Mesh of the target.", show_default=False)
 ]
@@ -71,7 +64,10 @@ def register_solids(
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> int:
-    """Map one solid torus onto another, landmarks to landmarks, volumes preserved."""
+    """Map one solid onto another by landmarks.
+
+    Both are solid tori. Volumes keep their shares, no tet is flipped, and the map is certified.
+    """
     from ..progress import terminal
     from ..registration import register as register_meshes
 
@@ -106,7 +102,7 @@ def coordinates(
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Carry points through a map, with their solid-torus coordinates (.csv).
+    """Carry points through a map (.csv).
 
     Each row holds a point of the source, its image, and u, v (radians) and s where the map has a
     torus. A point outside the mesh has nan for what is not known.
@@ -160,7 +156,7 @@ def partition(
     json: Json = None,
     quiet: Quiet = False,
 ) -> None:
-    """Divide a mapped solid into parts of prescribed volume."""
+    """Cut a mapped solid into parts by volume."""
     from ..io import suffixes
     from ..partitions import partition as cut
 
@@ -188,7 +184,10 @@ def resample(
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
-    """Structured hexahedral mesh of a mapped solid; exit code 1 if a Jacobian is not positive."""
+    """Mesh a mapped solid with hexahedra.
+
+    The mesh is structured; exit code 1 if a corner Jacobian is not positive.
+    """
     from ..resample import hex_mesh
 
     common.check_outputs(output, (".vtu", ".vtk"), json, map_file)
@@ -211,7 +210,10 @@ def morph(
     frames: Annotated[int, typer.Option(help="Number of frames, both ends included.")] = 21,
     quiet: Quiet = False,
 ) -> None:
-    """Linear homotopy from source to image: .pvd with a .vtu per frame, or an animated .gif."""
+    """Morph the source into its image.
+
+    Every vertex goes the straight way: .pvd with a .vtu per frame, or an animated .gif.
+    """
     from ..morphing import morph as homotopy
 
     common.check_output(output, (".pvd", ".gif"), map_file)

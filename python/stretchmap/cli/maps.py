@@ -77,7 +77,10 @@ def conformal(
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> None:
-    """Map a surface of genus one, or a solid's boundary, conformally onto a torus."""
+    """Map a surface conformally onto a torus.
+
+    The surface, or the boundary of the solid given, has genus one.
+    """
     from .._threads import threads as use_threads
     from ..conformal import conformal_map
 
@@ -110,7 +113,10 @@ def area(
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> None:
-    """Map a surface of genus one, or a solid's boundary, onto a torus, areas preserved."""
+    """Map a surface onto a torus, areas preserved.
+
+    The surface, or the boundary of the solid given, has genus one.
+    """
     from ..area import area_map
     from ..progress import terminal
 
@@ -174,7 +180,10 @@ def volume(
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> int:
-    """Map a solid torus onto the standard one, volumes preserved and no tet flipped."""
+    """Map a solid onto the solid torus.
+
+    Volumes are preserved, no tet is flipped, and the map is certified to be one to one.
+    """
     from ..progress import terminal
     from ..results import load_map
     from ..volume import volume_map
@@ -217,7 +226,10 @@ def certify(
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
-    """Prove that the map in a file, whoever wrote it, is a bijection; exit code 1 if it is not."""
+    """Prove that a map is one to one.
+
+    Whoever wrote the file; exit code 1 if it is not.
+    """
     from ..certificate import certify_file
     from ..results import versions
     from ..torus import Torus

@@ -76,7 +76,10 @@ def homology(
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find generators, handle and tunnel loops of a surface of any genus, or of a solid's."""
+    """Find handle and tunnel loops.
+
+    Also generators; of a surface of any genus, or of a solid's boundary.
+    """
     from ..homology import homology_basis
     from ..mesh import TetMesh
     from ..results import versions
@@ -114,7 +117,10 @@ def tet(
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> None:
-    """Fill a closed surface with tets, keeping the surface as it is."""
+    """Fill a closed surface with tets.
+
+    The surface is kept as it is.
+    """
     from .. import io
     from ..errors import MeshError
     from ..mesh import TetMesh

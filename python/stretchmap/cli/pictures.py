@@ -86,7 +86,10 @@ def plot(
 
 
 def report(map_file: MapFile, output: Output) -> None:
-    """Write one self-contained .html page about a map: figures, certificate, pictures."""
+    """Write a page about a map (.html).
+
+    One file with figures, certificate and pictures; nothing is fetched.
+    """
     from ..report import write_report
     from ..results import load_map
 
@@ -104,7 +107,10 @@ def demo(
     json: Json = None,
     quiet: Quiet = False,
 ) -> None:
-    """Generate a solid, map it onto the solid torus, draw it; needs no data."""
+    """Generate a solid, map it, draw it.
+
+    Needs no data.
+    """
     from .. import plot, samples
     from ..progress import terminal
     from ..volume import volume_map
