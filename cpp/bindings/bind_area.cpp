@@ -136,7 +136,7 @@ void bind_glide(py::module_& m) {
       .def(
           "step",
           [](SurfaceNewton& self, double area, double shape, double chart) {
-            return self.step(weights_of(area, shape, chart));
+            return self.step(weights_of(area, shape, chart), signal_poll());
           },
           py::arg("area"), py::arg("shape"), py::arg("chart"), release_gil())
       .def(

@@ -22,16 +22,21 @@ void bind_topology(py::module_& m) {
       .def_readonly("vertex_halfedge", &SurfaceTopology::vertex_halfedge);
 
   py::class_<TetBoundary>(m, "TetBoundary")
-      .def(py::init([](const TetsRef& tets, Index n) { return tet_boundary(tets, n); }),
+      .def(py::init(
+               [](const TetsRef& tets, Index n) { return tet_boundary(tets, n, signal_poll()); }),
            py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil())
       .def_readonly("faces", &TetBoundary::faces)
       .def_readonly("vertices", &TetBoundary::vertices)
       .def_readonly("index", &TetBoundary::index)
       .def_readonly("tets", &TetBoundary::tets);
 
-  m.def("tet_neighbours", &tet_neighbours, py::arg("tets").noconvert(), py::arg("n_vertices"),
-        release_gil());
-  m.def("tet_edges", &tet_edges, py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil());
+  m.def(
+      "tet_neighbours",
+      [](const TetsRef& tets, Index n) { return tet_neighbours(tets, n, signal_poll()); },
+      py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil());
+  m.def(
+      "tet_edges", [](const TetsRef& tets, Index n) { return tet_edges(tets, n, signal_poll()); },
+      py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil());
 }
 
 void bind_sizes(py::module_& m) {
@@ -65,8 +70,10 @@ void bind_diagnosis(py::module_& m) {
       .def_readonly("genus", &SurfaceDiagnosis::genus);
 
   py::class_<SolidDiagnosis>(m, "SolidDiagnosis")
-      .def(py::init(&diagnose_solid), py::arg("points").noconvert(), py::arg("tets").noconvert(),
-           release_gil())
+      .def(py::init([](const PointsRef& points, const TetsRef& tets) {
+             return diagnose_solid(points, tets, signal_poll());
+           }),
+           py::arg("points").noconvert(), py::arg("tets").noconvert(), release_gil())
       .def_readonly("repeated", &SolidDiagnosis::repeated)
       .def_readonly("duplicates", &SolidDiagnosis::duplicates)
       .def_readonly("degenerate", &SolidDiagnosis::degenerate)
@@ -86,15 +93,18 @@ void bind_diagnosis(py::module_& m) {
 
 void bind_boundary_joins(py::module_& m) {
   py::class_<BoundaryJoins>(m, "BoundaryJoins")
-      .def(py::init(&boundary_joins), py::arg("tets").noconvert(), py::arg("n_vertices"),
-           release_gil())
+      .def(py::init(
+               [](const TetsRef& tets, Index n) { return boundary_joins(tets, n, signal_poll()); }),
+           py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil())
       .def_readonly("edges", &BoundaryJoins::edges)
       .def_readonly("faces", &BoundaryJoins::faces)
       .def_readonly("tets", &BoundaryJoins::tets);
 
   py::class_<Refinement>(m, "Refinement")
-      .def(py::init(&refine_boundary_joins), py::arg("points").noconvert(),
-           py::arg("tets").noconvert(), release_gil())
+      .def(py::init([](const PointsRef& points, const TetsRef& tets) {
+             return refine_boundary_joins(points, tets, signal_poll());
+           }),
+           py::arg("points").noconvert(), py::arg("tets").noconvert(), release_gil())
       .def_readonly("points", &Refinement::points)
       .def_readonly("tets", &Refinement::tets)
       .def_readonly("parent_tet", &Refinement::parent_tet)

@@ -19,6 +19,7 @@ from . import _core
 from ._arrays import read_only
 from ._bounding import bounding_by_linking, bounding_in, least_skew_longitude, same_lattice
 from ._integer import integer_inverse, reduced_basis
+from ._npz import save_npz
 from .errors import ArrayError, GenusError, SelfIntersectionError
 from .forms import HarmonicForms, solve_harmonic
 from .results import atomic_path, table
@@ -244,7 +245,7 @@ class HomologyBasis:
             arrays.update(meridian=self.meridian, longitude=self.longitude)
             arrays["torus_forms"] = self.torus_forms
         with atomic_path(path) as temporary, open(temporary, "wb") as file:
-            np.savez_compressed(file, **arrays)
+            save_npz(file, arrays)
 
 
 def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBasis:

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._meshio import read_meshio, write_meshio
+from ._npz import save_npz
 from ._ply import read_ply, write_ply
 from ._surface_files import (
     MeshArrays,
@@ -266,7 +267,7 @@ def _write_npz(file: BinaryIO, mesh: MeshArrays) -> None:
     if clash:
         raise ArrayError(f"an .npz file cannot hold two arrays named {', '.join(sorted(clash))}")
     elements = {"F": mesh.F} if mesh.T is None else {"T": mesh.T}
-    np.savez_compressed(file, V=mesh.V, **elements, **mesh.point_data, **mesh.cell_data)
+    save_npz(file, {"V": mesh.V, **elements, **mesh.point_data, **mesh.cell_data})
 
 
 def _checked(data: Mapping[str, ArrayLike] | None, rows: int, what: str) -> dict[str, NDArray[Any]]:

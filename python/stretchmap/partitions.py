@@ -368,7 +368,7 @@ def _cut_all(
                 sheet, gate = pieces.sheet(axis, level)
                 pieces = pieces.cut(sheet, gate if axis == "u" else _NO_GATE)
     # Every function is linear on a piece and has one sign in it, so its centroid tells the part.
-    centre = pieces.points[pieces.T].mean(axis=1)
+    centre = 0.25 * sum(pieces.points[corner] for corner in pieces.T.T)
     labels = np.zeros(len(pieces.T), np.intp)
     for axis, cuts in zip(axes, levels, strict=True):
         if axis == "s":

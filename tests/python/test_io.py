@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import shapes
+from stretchmap._npz import save_npz
 from stretchmap.errors import (
     ArrayError,
     FileFormatError,
@@ -369,3 +370,13 @@ def test_reads_the_test_meshes(mesh_dir: Path, load_surface, load_solid):
     arm = read(mesh_dir / "tets" / "rocker_arm_small.vtu")
     np.testing.assert_array_equal(arm.T, load_solid("rocker_arm_small").T)
     np.testing.assert_array_equal(arm.V, load_solid("rocker_arm_small").V)
+
+
+def test_compressed_files_are_read_by_numpy(tmp_path):
+    """Slices smaller than an array leave the file what numpy would have written."""
+    arrays = {"a": np.random.default_rng(0).normal(size=(300_000, 3)), "b": np.arange(5)[::2]}
+    with open(tmp_path / "a.npz", "wb") as file:
+        save_npz(file, arrays)
+    with np.load(tmp_path / "a.npz") as loaded:
+        assert loaded.files == ["a", "b"]
+        assert all(np.array_equal(loaded[name], array) for name, array in arrays.items())

@@ -41,8 +41,12 @@ constexpr int kFace[4][3] = {{0, 3, 1}, {0, 4, 2}, {1, 5, 2}, {3, 5, 4}};
 
 class Propagation {
  public:
-  Propagation(const TetsRef& tets, const EdgesRef& edges, Index n_vertices)
-      : edges_(edges), value_(edges.rows()), known_(edges.rows(), 0), first_(n_vertices + 1, 0) {
+  Propagation(const TetsRef& tets, const EdgesRef& edges, Index n_vertices, const Poll& poll)
+      : edges_(edges),
+        poll_(poll),
+        value_(edges.rows()),
+        known_(edges.rows(), 0),
+        first_(n_vertices + 1, 0) {
     for (Index e = 0; e < edges.rows(); ++e) ++first_[edges(e, 0) + 1];
     for (Index i = 0; i < n_vertices; ++i) first_[i + 1] += first_[i];
     index_tets(tets);
@@ -62,12 +66,11 @@ class Propagation {
     return low < first_[i + 1] && edges_(low, 1) == j ? low : -1;
   }
 
-  void run(const Poll& poll) {
+  void run() {
     const std::vector<Index> order = span();
     propagate();
     for (const Index e : order) {
       if (known_[e]) continue;
-      if (poll) poll();
       learn(e, {{n_unknowns_++, 1}});
       propagate();
     }
@@ -76,6 +79,7 @@ class Propagation {
   std::set<Value> relations() const {
     std::set<Value> found;
     for (std::size_t t = 0; t < tet_edges_.size(); ++t) {
+      if (poll_ && t % 65536 == 0) poll_();
       for (const auto& face : kFace) {
         Value sum = value_[tet_edges_[t][face[0]]];
         add(sum, value_[tet_edges_[t][face[1]]], 1);
@@ -95,6 +99,7 @@ class Propagation {
     tet_edges_.resize(tets.rows());
     around_start_.assign(edges_.rows() + 1, 0);
     for (Index t = 0; t < tets.rows(); ++t) {
+      if (poll_ && t % 65536 == 0) poll_();
       std::array<Index, 4> corner{tets(t, 0), tets(t, 1), tets(t, 2), tets(t, 3)};
       std::sort(corner.begin(), corner.end());
       for (int k = 0; k < 6; ++k) {
@@ -158,6 +163,7 @@ class Propagation {
 
   void propagate() {
     while (!queue_.empty()) {
+      if (poll_ && ++work_ % 65536 == 0) poll_();
       const Index e = queue_.back();
       queue_.pop_back();
       for (Index p = around_start_[e]; p < around_start_[e + 1]; ++p) complete(around_[p]);
@@ -185,6 +191,8 @@ class Propagation {
   }
 
   const EdgesRef& edges_;
+  const Poll& poll_;
+  std::size_t work_ = 0;
   std::vector<Value> value_;
   std::vector<char> known_;
   std::vector<Index> first_;  // edges with lower id i are first_[i] .. first_[i + 1]
@@ -198,8 +206,8 @@ class Propagation {
 
 SolidCohomology solid_cohomology(const TetsRef& tets, const EdgesRef& edges, Index n_vertices,
                                  const std::vector<Loop>& loops, const Poll& poll) {
-  Propagation forms(tets, edges, n_vertices);
-  forms.run(poll);
+  Propagation forms(tets, edges, n_vertices, poll);
+  forms.run();
   const std::set<Value> relations = forms.relations();
   SolidCohomology result;
   result.relations.setZero(relations.size(), forms.n_unknowns());

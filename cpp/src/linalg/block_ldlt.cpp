@@ -79,11 +79,12 @@ BlockLdlt<K>::BlockLdlt(const SparseMatrix& A)
 
 // Row by row: each row of L solves a triangular system whose pattern is read off the tree.
 template <int K>
-void BlockLdlt<K>::factorise(const SparseMatrix& A) {
+void BlockLdlt<K>::factorise(const SparseMatrix& A, const Poll& poll) {
   std::vector<Index> filled(start_.begin(), start_.end() - 1), mark(order_.size(), -1);
   std::vector<Index> path(order_.size()), pattern(order_.size());
   std::vector<Block> work(order_.size(), Block::Zero());
   for (Index k = 0; k < n_; ++k) {
+    if (poll && k % 256 == 0) poll();
     mark[k] = k;
     Index top = n_;
     const BlockRow<K> row(A, order_[k]);

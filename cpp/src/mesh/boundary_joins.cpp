@@ -40,8 +40,8 @@ struct Plan {
 // Vertices and edges on the boundary.
 class Rim {
  public:
-  Rim(const TetsRef& tets, Index n_vertices) {
-    const TetBoundary boundary = tet_boundary(tets, n_vertices);
+  Rim(const TetsRef& tets, Index n_vertices, const Poll& poll) {
+    const TetBoundary boundary = tet_boundary(tets, n_vertices, poll);
     vertices_ = boundary.index;
     edges_.reserve(3 * boundary.faces.rows());
     for (Index f = 0; f < boundary.faces.rows(); ++f) {
@@ -62,9 +62,10 @@ class Rim {
   std::vector<std::uint64_t> edges_;
 };
 
-void plan_edges(const TetsRef& tets, Index n_vertices, const Rim& rim, Plan& plan) {
+void plan_edges(const TetsRef& tets, Index n_vertices, const Rim& rim, Plan& plan,
+                const Poll& poll) {
   std::vector<Pair> edges;
-  const FacetGroups groups = group_tet_edges(tets, n_vertices);
+  const FacetGroups groups = group_tet_edges(tets, n_vertices, {}, poll);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index h = groups.order[groups.start[g]];
     const Index a = tets(h / 6, kTetEdge[h % 6][0]), b = tets(h / 6, kTetEdge[h % 6][1]);
@@ -80,9 +81,9 @@ void plan_edges(const TetsRef& tets, Index n_vertices, const Rim& rim, Plan& pla
 
 // Added vertices are numbered from `first_vertex`.
 void plan_faces(const TetsRef& tets, Index n_vertices, Index first_vertex, const Rim& rim,
-                Plan& plan) {
+                Plan& plan, const Poll& poll) {
   std::vector<Triple> faces;
-  const FacetGroups groups = group_half_faces(tets, n_vertices);
+  const FacetGroups groups = group_half_faces(tets, n_vertices, {}, poll);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index first = groups.start[g];
     if (groups.start[g + 1] - first < 2) continue;
@@ -97,7 +98,7 @@ void plan_faces(const TetsRef& tets, Index n_vertices, Index first_vertex, const
   plan.joins.faces = detail::as_rows<Faces>(faces);
 }
 
-Plan plan_splits(const TetsRef& tets, Index n_vertices) {
+Plan plan_splits(const TetsRef& tets, Index n_vertices, const Poll& poll) {
   const IndexVec repeated = set_entries(detail::repeating(tets));
   if (repeated.size() > 0) {
     throw Error("DegenerateError",
@@ -105,10 +106,11 @@ Plan plan_splits(const TetsRef& tets, Index n_vertices) {
                     std::to_string(repeated[0]) + "; remove them",
                 {repeated.begin(), repeated.end()});
   }
-  const Rim rim(tets, n_vertices);
+  const Rim rim(tets, n_vertices, poll);
   Plan plan;
-  plan_edges(tets, n_vertices, rim, plan);
-  plan_faces(tets, n_vertices, n_vertices + static_cast<Index>(plan.joins.edges.rows()), rim, plan);
+  plan_edges(tets, n_vertices, rim, plan, poll);
+  plan_faces(tets, n_vertices, n_vertices + static_cast<Index>(plan.joins.edges.rows()), rim, plan,
+             poll);
   std::sort(plan.splits.begin(), plan.splits.end(), [](const Split& a, const Split& b) {
     return std::pair(a.tet, a.vertex) < std::pair(b.tet, b.vertex);
   });
@@ -141,13 +143,13 @@ void split_pieces(const Split& split, std::vector<Tet>& pieces) {
 
 }  // namespace
 
-BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices) {
-  return plan_splits(tets, n_vertices).joins;
+BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices, const Poll& poll) {
+  return plan_splits(tets, n_vertices, poll).joins;
 }
 
-Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets) {
+Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets, const Poll& poll) {
   const Index n = static_cast<Index>(points.rows());
-  Plan plan = plan_splits(tets, n);
+  Plan plan = plan_splits(tets, n, poll);
   const Index n_edges = static_cast<Index>(plan.joins.edges.rows());
   const Index n_faces = static_cast<Index>(plan.joins.faces.rows());
   Refinement result;

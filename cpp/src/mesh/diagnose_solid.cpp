@@ -52,7 +52,7 @@ void boundary(const PointsRef& points, const TetsRef& tets, const FacetGroups& f
 // form a connected surface, perhaps pinched, whose Euler characteristic is 2 (inside) or 1 (on the
 // boundary) in just those cases, because handles and pinches only lower it.
 void vertex_links(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& edges,
-                  const Mask& skip, Index n_vertices, SolidDiagnosis& report) {
+                  const Mask& skip, Index n_vertices, SolidDiagnosis& report, const Poll& poll) {
   DisjointSets corners(static_cast<Index>(4 * tets.rows()));
   IndexVec euler = IndexVec::Zero(n_vertices);
   IndexVec expected = IndexVec::Constant(n_vertices, 2);
@@ -63,6 +63,7 @@ void vertex_links(const TetsRef& tets, const FacetGroups& faces, const FacetGrou
     return 4 * t + 3;
   };
   for (Index g = 0; g < faces.size(); ++g) {
+    if (poll && g % 65536 == 0) poll();
     const Index first = faces.start[g], last = faces.start[g + 1];
     const Index h = faces.order[first];
     for (const Index v : half_face(tets, h)) {
@@ -115,19 +116,25 @@ void topology(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& 
 
 }  // namespace
 
-SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets) {
+SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets, const Poll& poll) {
+  const auto rest = [&] {
+    if (poll) poll();
+  };
   const Index n_vertices = static_cast<Index>(points.rows());
   SolidDiagnosis report;
-  const detail::LeftOut out = detail::left_out(tets, group_equal_tets(tets, n_vertices));
+  const detail::LeftOut out = detail::left_out(tets, group_equal_tets(tets, n_vertices, poll));
   const Mask& skip = out.either;
   report.repeated = set_entries(out.repeated);
   report.duplicates = set_entries(out.copies);
 
-  const FacetGroups faces = group_half_faces(tets, n_vertices, skip);
-  const FacetGroups edges = group_tet_edges(tets, n_vertices, skip);
+  const FacetGroups faces = group_half_faces(tets, n_vertices, skip, poll);
+  const FacetGroups edges = group_tet_edges(tets, n_vertices, skip, poll);
+  rest();
   orientation(points, tets, faces, skip, report);
+  rest();
   boundary(points, tets, faces, report);
-  vertex_links(tets, faces, edges, skip, n_vertices, report);
+  vertex_links(tets, faces, edges, skip, n_vertices, report, poll);
+  rest();
   topology(tets, faces, edges, skip, n_vertices, report);
   return report;
 }

@@ -24,9 +24,13 @@ bool before(const Key& a, const Key& b) {
 // corners(facet) returns the ids of a facet in any order; `used(facet)` says whether it counts.
 // Counting sort by the lowest id, then a short sort inside each bucket.
 template <std::size_t N, class Corners, class Used>
-FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used) {
+FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used, const Poll& poll) {
+  const auto now_and_then = [&](Index i, Index period) {
+    if (poll && i % period == 0) poll();
+  };
   std::vector<Index> bucket(static_cast<std::size_t>(n_vertices) + 1, 0);
   for (Index h = 0; h < n_facets; ++h) {
+    now_and_then(h, 262144);
     if (!used(h)) continue;
     const std::array<Index, N> c = corners(h);
     ++bucket[*std::min_element(c.begin(), c.end()) + 1];
@@ -35,6 +39,7 @@ FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used) 
   std::vector<Key> keys(bucket[n_vertices]);
   std::vector<Index> cursor(bucket.begin(), bucket.end() - 1);
   for (Index h = 0; h < n_facets; ++h) {
+    now_and_then(h, 262144);
     if (!used(h)) continue;
     std::array<Index, N> c = corners(h);
     std::sort(c.begin(), c.end());
@@ -47,6 +52,7 @@ FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used) 
   groups.order.resize(keys.size());
   groups.start.reserve(keys.size() / 2 + 1);
   for (Index i = 0; i < n_vertices; ++i) {
+    now_and_then(i, 16384);
     std::sort(keys.begin() + bucket[i], keys.begin() + bucket[i + 1], before);
     for (Index p = bucket[i]; p < bucket[i + 1]; ++p) {
       if (p == bucket[i] || !same(keys[p - 1], keys[p])) groups.start.push_back(p);
@@ -59,33 +65,36 @@ FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used) 
 
 }  // namespace
 
-FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip) {
+FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip,
+                             const Poll& poll) {
   return group<2>(
       static_cast<Index>(3 * faces.rows()), n_vertices,
       [&](Index h) {
         return std::array<Index, 2>{faces(h / 3, h % 3), faces(h / 3, (h + 1) % 3)};
       },
-      [&](Index h) { return skip.empty() || !skip[h / 3]; });
+      [&](Index h) { return skip.empty() || !skip[h / 3]; }, poll);
 }
 
-FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip) {
+FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip,
+                             const Poll& poll) {
   return group<3>(
       static_cast<Index>(4 * tets.rows()), n_vertices,
       [&](Index h) {
         const auto f = half_face(tets, h);
         return std::array<Index, 3>{f[0], f[1], f[2]};
       },
-      [&](Index h) { return skip.empty() || !skip[h / 4]; });
+      [&](Index h) { return skip.empty() || !skip[h / 4]; }, poll);
 }
 
-FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip) {
+FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip,
+                            const Poll& poll) {
   return group<2>(
       static_cast<Index>(6 * tets.rows()), n_vertices,
       [&](Index h) {
         const int* corner = kTetEdge[h % 6];
         return std::array<Index, 2>{tets(h / 6, corner[0]), tets(h / 6, corner[1])};
       },
-      [&](Index h) { return skip.empty() || !skip[h / 6]; });
+      [&](Index h) { return skip.empty() || !skip[h / 6]; }, poll);
 }
 
 FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices) {
@@ -94,16 +103,16 @@ FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices) {
       [&](Index f) {
         return std::array<Index, 3>{faces(f, 0), faces(f, 1), faces(f, 2)};
       },
-      [](Index) { return true; });
+      [](Index) { return true; }, {});
 }
 
-FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices) {
+FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices, const Poll& poll) {
   return group<4>(
       static_cast<Index>(tets.rows()), n_vertices,
       [&](Index t) {
         return std::array<Index, 4>{tets(t, 0), tets(t, 1), tets(t, 2), tets(t, 3)};
       },
-      [](Index) { return true; });
+      [](Index) { return true; }, poll);
 }
 
 int same_turn(const Eigen::Matrix<Index, 1, 3>& a, const Eigen::Matrix<Index, 1, 3>& b) {

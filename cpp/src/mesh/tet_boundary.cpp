@@ -9,8 +9,8 @@
 
 namespace stretchmap {
 
-IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices) {
-  const FacetGroups groups = group_half_faces(tets, n_vertices);
+IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices, const Poll& poll) {
+  const FacetGroups groups = group_half_faces(tets, n_vertices, {}, poll);
   IndexVec twin = IndexVec::Constant(4 * tets.rows(), -1);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index first = groups.start[g], last = groups.start[g + 1];
@@ -32,8 +32,8 @@ IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices) {
   return twin;
 }
 
-TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices) {
-  const IndexVec twin = tet_neighbours(tets, n_vertices);
+TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices, const Poll& poll) {
+  const IndexVec twin = tet_neighbours(tets, n_vertices, poll);
   TetBoundary boundary;
   const Index n_faces = static_cast<Index>((twin.array() < 0).count());
   boundary.faces.resize(n_faces, 3);
@@ -58,8 +58,8 @@ TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices) {
   return boundary;
 }
 
-Edges tet_edges(const TetsRef& tets, Index n_vertices) {
-  const FacetGroups groups = group_tet_edges(tets, n_vertices);
+Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll) {
+  const FacetGroups groups = group_tet_edges(tets, n_vertices, {}, poll);
   Edges edges(groups.size(), 2);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index h = groups.order[groups.start[g]];

@@ -16,7 +16,8 @@ constexpr double kTwoPi = 6.283185307179586476925287;
 constexpr double kArmijo = 1e-4;
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
 constexpr int kBestSteps = 2;        // towards it, of each kind
-constexpr int kStiffSteps = 4;
+constexpr int kStiffSteps = 6;
+constexpr double kGain = 1e-2;  // of a step after which its factor serves again
 constexpr int kHalvings = 30;
 constexpr double kRidge = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
@@ -51,10 +52,11 @@ SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
   problem_.facing = all_facing(problem_, angles_);
 }
 
-GlideStep SurfaceNewton::step(const SurfaceWeights& weights) {
+GlideStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
   const double scale = best_scale(problem_, angles_);
   const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
-  factorise(here.hessians);
+  if (poll) poll();
+  factorise(here.hessians, poll);
   const Vec flat = solver_->solve(-here.gradient);
   const Points2 direction = without_rotation(as_rows(flat));
 
@@ -62,6 +64,7 @@ GlideStep SurfaceNewton::step(const SurfaceWeights& weights) {
   GlideStep result{here.value, here.value, 0.0, -slope};
   double t = longest_step(direction);
   for (int halving = 0; halving < kHalvings; ++halving, t *= 0.5) {
+    if (poll) poll();
     const Points2 trial = angles_ + t * direction;
     const double value = glide_energy(problem_, weights, scale, trial, Derivatives::kNone).value;
     if (!(value <= here.value + kArmijo * t * slope) || !flipped(problem_, trial).empty()) continue;
@@ -73,13 +76,13 @@ GlideStep SurfaceNewton::step(const SurfaceWeights& weights) {
   return result;
 }
 
-void SurfaceNewton::factorise(const Rows& hessians) {
+void SurfaceNewton::factorise(const Rows& hessians, const Poll& poll) {
   SparseMatrix matrix = pattern_.zeros();
   pattern_.scatter(hessians, matrix.valuePtr());
   const double ridge = kRidge * Vec(matrix.diagonal()).mean();
   for (Index i = 0; i < matrix.rows(); ++i) matrix.coeffRef(i, i) += ridge;
   if (!solver_) solver_.emplace(matrix);
-  solver_->factorise(matrix);
+  solver_->factorise(matrix, poll);
 }
 
 // At most 1, and at most nine tenths of the way to the first face of no area in the (u, v) chart.
@@ -105,15 +108,19 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd,
   const auto take = [&](RingStep kind) {
     if (poll) poll();
     const Points2 direction = without_rotation(
-        rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind));
+        rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind, poll));
     angles_ += longest_step(direction) * direction;
     return figures();
   };
   SurfaceFigures now = before;
   try {
     for (int step = 0; step < kBestSteps; ++step) now = take(RingStep::kBest);
-    for (int step = 0; step < kStiffSteps && now.ring_sd > kRingGoal; ++step)
-      now = take(RingStep::kStiff);
+    RingStep kind = RingStep::kStiff;
+    for (int step = 0; step < kStiffSteps && now.ring_sd > kRingGoal; ++step) {
+      const double sd = now.ring_sd;
+      now = take(kind);
+      kind = now.ring_sd <= kGain * sd ? RingStep::kAgain : RingStep::kStiff;
+    }
   } catch (const Error&) {  // singular: nothing to be had
     now.ring_sd = std::numeric_limits<double>::infinity();
   }

@@ -76,26 +76,27 @@ SparseMatrix with_give(SparseMatrix matrix) {
 }  // namespace
 
 Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
-                         const Points2Ref& angles, RingStep kind) {
+                         const Points2Ref& angles, RingStep kind, const Poll& poll) {
   const Index n = problem.chart.n_vertices;
   const Rings rings = measure(problem, angles);
-  SurfaceWeights model = weights;
-  if (kind == RingStep::kStiff) model.area = 0.0;
-  GlideEnergy energy = glide_energy(problem, model, scale, angles, Derivatives::kModel);
-  if (kind == RingStep::kStiff) energy.gradient.setZero();
-  SparseMatrix exact = pattern_.zeros();
-  pattern_.scatter(elements(problem, rings, energy.hessians), exact.valuePtr());
-  Vec right(3 * n);
-  for (Index i = 0; i < n; ++i) {
-    right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
+  Vec right = Vec::Zero(3 * n);
+  for (Index i = 0; i < n; ++i)
     right(3 * i + 2) = 1.0 - rings.image(i) / (rings.total * rings.source(i));
+  if (kind != RingStep::kAgain) {
+    SurfaceWeights model = weights;
+    if (kind == RingStep::kStiff) model.area = 0.0;
+    const GlideEnergy energy = glide_energy(problem, model, scale, angles, Derivatives::kModel);
+    exact_ = pattern_.zeros();
+    pattern_.scatter(elements(problem, rings, energy.hessians), exact_.valuePtr());
+    for (Index i = 0; i < n && kind == RingStep::kBest; ++i)
+      right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
+    const SparseMatrix yielding = with_give(exact_);
+    if (!factor_) factor_.emplace(yielding);
+    factor_->factorise(yielding, poll);
   }
-  const SparseMatrix yielding = with_give(exact);
-  if (!factor_) factor_.emplace(yielding);
-  factor_->factorise(yielding);
   Vec solution = factor_->solve(right);
   for (int i = 0; i < kRefinements; ++i) {
-    const Vec residual = right - exact * solution;
+    const Vec residual = right - exact_ * solution;
     if (residual.norm() <= kAccuracy * right.norm()) break;
     solution += factor_->solve(residual);
   }

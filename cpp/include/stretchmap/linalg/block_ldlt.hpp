@@ -19,7 +19,7 @@ class BlockLdlt {
 
   // \pre the pattern given to the constructor.
   // \throws Error "SolverError" for a pivot that is zero or not finite.
-  void factorise(const SparseMatrix& A);
+  void factorise(const SparseMatrix& A, const Poll& poll = {});
 
   // \pre factorise was called.
   Vec solve(const VecRef& right) const;

@@ -27,11 +27,12 @@ struct Refinement {
 
 // \throws Error "NonManifoldError" for a face shared by more than two tets, "DegenerateError" for
 //         tets that repeat a vertex; ids: the tets.
-BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices);
+BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 // Orientation and total volume are kept. A tet that is its own component, with all its faces on the
 // boundary, has nothing to split and stays.
 // \throws as above.
-Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets);
+Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets,
+                                 const Poll& poll = {});
 
 }  // namespace stretchmap

@@ -47,6 +47,6 @@ struct SolidDiagnosis {
 
 // \pre indices in range, points finite.
 SurfaceDiagnosis diagnose_surface(const PointsRef& points, const FacesRef& faces);
-SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets);
+SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets, const Poll& poll = {});
 
 }  // namespace stretchmap

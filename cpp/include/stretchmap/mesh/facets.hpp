@@ -24,12 +24,15 @@ struct FacetGroups {
 using Mask = std::vector<char>;
 
 // \pre indices in [0, n_vertices). Elements with a set mask are left out.
-FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip = {});
-FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip = {});
-FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip = {});
+FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip = {},
+                             const Poll& poll = {});
+FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip = {},
+                             const Poll& poll = {});
+FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip = {},
+                            const Poll& poll = {});
 // Whole elements with the same vertex set.
 FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices);
-FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices);
+FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 // Vertices of half-face h, in its outward order.
 inline Eigen::Matrix<Index, 1, 3> half_face(const TetsRef& tets, Index h) {

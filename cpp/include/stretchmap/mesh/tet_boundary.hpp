@@ -15,13 +15,13 @@ struct TetBoundary {
 // Faces are ordered by tet, then by the corner they lie opposite to.
 // \pre indices in [0, n_vertices).
 // \throws Error "NonManifoldError" for a face shared by more than two tets (ids: the tets).
-TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices);
+TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 // (4 k) the half-face on the other side of each half-face, -1 on the boundary.
 // \throws as above.
-IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices);
+IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 // (e, 2) edges of a tet mesh, lower id first, in lexicographic order.
-Edges tet_edges(const TetsRef& tets, Index n_vertices);
+Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 }  // namespace stretchmap

@@ -27,11 +27,12 @@ class SurfaceNewton {
   SurfaceNewton(GlideProblem problem, Points2 angles);
 
   // The scale of the areas is renewed first, which lowers the energy by itself.
-  GlideStep step(const SurfaceWeights& weights);
+  GlideStep step(const SurfaceWeights& weights, const Poll& poll = {});
 
   // Makes the ring areas exact: two steps of RingSystem that are best for the faces, then stiff
-  // ones. Refused (false, nothing changed) if that cannot be done without a flip or raises a
-  // figure of the faces above both what it was and the limit given.
+  // ones; after one that gained enough the next reuses its factor. Refused (false, nothing changed)
+  // if that cannot be done without a flip or raises a figure of the faces above both what it was
+  // and the limit given.
   bool project_rings(const SurfaceWeights& weights, double face_sd, double face_error,
                      const Poll& poll = {});
 
@@ -41,7 +42,7 @@ class SurfaceNewton {
   const GlideProblem& problem() const { return problem_; }
 
  private:
-  void factorise(const Rows& hessians);
+  void factorise(const Rows& hessians, const Poll& poll);
   double longest_step(const Points2& direction) const;
 
   GlideProblem problem_;

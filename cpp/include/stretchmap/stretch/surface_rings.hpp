@@ -10,8 +10,9 @@
 namespace stretchmap {
 
 enum class RingStep {
-  kBest,  // best for the quadratic model of the energy
-  kStiff  // smallest when shape and chart are springs
+  kBest,   // best for the quadratic model of the energy
+  kStiff,  // smallest when shape and chart are springs
+  kAgain   // like the step before, with its matrix
 };
 
 // The equations of one step, three unknowns per vertex (u, v and the multiplier of its ring); the
@@ -24,12 +25,14 @@ class RingSystem {
   // the total to first order and, among all that do, is best for the energy or smallest:
   //   [ H  J' ] [ dq ]   [ -g ]
   //   [ J  0  ] [ mu ] = [ -r ]
+  // kAgain: J and H are those of the step before, and g is zero.
   // \throws Error "SolverError" when the factorisation breaks down.
   Points2 step(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
-               const Points2Ref& angles, RingStep kind);
+               const Points2Ref& angles, RingStep kind, const Poll& poll = {});
 
  private:
   SurfacePattern pattern_;
+  SparseMatrix exact_;                  // of the last step that was not kAgain
   std::optional<BlockLdlt<3>> factor_;  // from the first step on
 };
 
