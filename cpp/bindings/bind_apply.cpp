@@ -1,5 +1,6 @@
 #include "arrays.hpp"
 #include "stretchmap/apply/chart_locator.hpp"
+#include "stretchmap/apply/grid_relax.hpp"
 #include "stretchmap/apply/split_tets.hpp"
 #include "stretchmap/apply/surface_match.hpp"
 #include "stretchmap/apply/surface_relax.hpp"
@@ -70,6 +71,26 @@ void bind_apply(py::module_& m) {
       py::arg("target_faces").noconvert(), py::arg("target_slopes").noconvert(),
       py::arg("rest").noconvert(), py::arg("weights").noconvert(), py::arg("held").noconvert(),
       py::arg("sweeps"), py::arg("y"), py::arg("X"), py::arg("reach"), release_gil());
+
+  m.def(
+      "relax_grid",
+      [](const TetsRef& corners, const RowsRef& rest, const VecRef& weights,
+         const EnergyWeights& corner, double slack, double power, const PointsRef& home,
+         const Points2Ref& home_y, const VecRef& pull, const ChartLocator& locator,
+         const PointsRef& points, const FacesRef& faces, const RowsRef& slopes,
+         const IndexVecRef& rim, int sweeps, Points2 y, Points x, Vec reach) {
+        const RelaxReport report =
+            relax_grid({corners, rest, weights}, {corner, slack, power, home, home_y, pull},
+                       {locator, points, faces, slopes}, rim, sweeps, y, x, reach, signal_poll());
+        return std::make_tuple(std::move(y), std::move(x), std::move(reach), report.gain,
+                               report.moved);
+      },
+      py::arg("corners").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
+      py::arg("corner_energy"), py::arg("slack"), py::arg("power"), py::arg("home").noconvert(),
+      py::arg("home_y").noconvert(), py::arg("pull").noconvert(), py::arg("locator"),
+      py::arg("points").noconvert(), py::arg("faces").noconvert(), py::arg("slopes").noconvert(),
+      py::arg("rim").noconvert(), py::arg("sweeps"), py::arg("y"), py::arg("x"), py::arg("reach"),
+      release_gil());
 
   py::class_<TetSplit>(m, "TetSplit")
       .def_readonly("tets", &TetSplit::tets)

@@ -1,12 +1,9 @@
 """Structured hexahedral meshes of a solid through its map, and fields carried from solid to solid.
 
 The section of the solid torus is an O-grid: a square block in the middle, rings round it. Swept
-round the axis and pulled back to the source it is a mesh of hexahedra without irregular ends. A
-hexahedron is right where the Jacobian at each of its eight corners is positive, that is, where the
-tet of the corner and its three neighbours is. Where the piecewise-affine map leaves one that is
-not, the same flip-free optimisation that makes maps is run on these corner tets with the boundary
-held. At a sharp ridge no inner point may be right for all four boundary quads of a vertex; such
-vertices, and only they, are then let go of the boundary. How far they moved is reported.
+round the axis and pulled back to the source it is a mesh of hexahedra without irregular ends. Where
+the piecewise-affine map leaves hexahedra turned over or nearly so, the grid is repaired (see
+`_hexes`); its boundary points then glide on the surface of the solid.
 """
 
 from __future__ import annotations
@@ -22,8 +19,9 @@ from scipy.spatial import cKDTree
 
 from . import _core
 from ._arrays import read_only
+from ._flat import FlatSurface
+from ._hexes import GridRepair, corner_tets, hex_volumes, jacobians, o_grid
 from .errors import ArrayError, FileFormatError, MissingDependencyError, OptionError, SolverError
-from .flip_free import FlipFreeOptions, FlipFreeSolver
 from .results import atomic_path, plain, table
 from .torus import TWO_PI, Torus
 
@@ -34,16 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["HexMesh", "hex_mesh", "transfer"]
 
-# Corner of a hexahedron and the three corners joined to it, positively oriented.
-_CORNERS = np.array(
-    [[0, 1, 3, 4], [1, 2, 0, 5], [2, 3, 1, 6], [3, 0, 2, 7],
-     [4, 7, 5, 0], [5, 4, 6, 1], [6, 5, 7, 2], [7, 6, 4, 3]]
-)  # fmt: skip
 _BISECTIONS = 40
-_ROUNDS = 12  # of letting vertices go, then of drawing them back
-_ADAPT = 3  # steps of the inner points between two draws
-_HALVINGS = 40
-_SQUARE = 0.5  # half diagonal of the middle block over the radius of the section
+_LEAST = 0.05  # least scaled Jacobian of a grid that is not repaired
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +52,16 @@ class HexMesh:
         Their (u, v, s).
     jacobians : ndarray, shape (k, 8)
         Jacobian at every corner over the product of the three edge lengths, at most 1.
+    volumes : ndarray, shape (k,)
+        Of the trilinear hexahedra.
+    volume_ratios : ndarray, shape (k,)
+        Share of each hexahedron in the volume over the share it has in the standard grid: 1 where
+        the map preserves volume and the hexahedra follow it.
     n_pulled_back_negative : int
         Hexahedra with a corner that is not positive before the repair.
-    rim_moved : float
-        How far the repair moved a boundary point at most, as a share of the diagonal of the box;
-        zero if all stayed on the surface.
-    volume : float
+    moved, rim_moved : float
+        How far the repair moved a point, and a boundary point, at most, as a share of the diagonal
+        of the box. Boundary points stay on the surface all the way.
     """
 
     V: NDArray[np.float64]
@@ -75,9 +69,16 @@ class HexMesh:
     grid: NDArray[np.float64]
     coordinates: NDArray[np.float64]
     jacobians: NDArray[np.float64]
+    volumes: NDArray[np.float64]
+    volume_ratios: NDArray[np.float64]
     n_pulled_back_negative: int
+    moved: float
     rim_moved: float
-    volume: float
+
+    @property
+    def volume(self) -> float:
+        """Sum of the volumes."""
+        return float(self.volumes.sum())
 
     @property
     def n_negative(self) -> int:
@@ -92,9 +93,13 @@ class HexMesh:
                 "n_hexahedra": len(self.H),
                 "n_negative": self.n_negative,
                 "n_pulled_back_negative": self.n_pulled_back_negative,
+                "moved": self.moved,
                 "rim_moved": self.rim_moved,
                 "jacobian_min": self.jacobians.min(),
                 "jacobian_mean": self.jacobians.mean(),
+                "volume_ratio_sd": self.volume_ratios.std(),
+                "volume_ratio_min": self.volume_ratios.min(),
+                "volume_ratio_max": self.volume_ratios.max(),
                 "volume": self.volume,
             }
         )
@@ -128,7 +133,10 @@ class HexMesh:
             self.V,
             [("hexahedron", self.H)],
             point_data={"coordinates": self.coordinates, "grid": self.grid},
-            cell_data={"jacobian": [self.jacobians.min(axis=1)]},
+            cell_data={
+                "jacobian": [self.jacobians.min(axis=1)],
+                "volume_ratio": [self.volume_ratios],
+            },
         )
         with atomic_path(path) as temporary:
             meshio.write(temporary, mesh)
@@ -158,7 +166,8 @@ def hex_mesh(
     rings : int
         Layers of hexahedra between block and boundary.
     repair : bool
-        Make all corner Jacobians positive where the pulled-back grid leaves some that are not.
+        Make all corner Jacobians positive where the pulled-back grid leaves some that are not, or
+        below 0.05 when scaled by the edges.
 
     Returns
     -------
@@ -171,7 +180,8 @@ def hex_mesh(
     ArrayError
         If the map is that of a surface.
     SolverError
-        If the core of the torus lies outside the image, or the repair fails.
+        If the core of the torus lies outside the image, or the repair fails; then ``ids`` are the
+        hexahedra that are left.
     """
     if sections < 3 or block < 1 or rings < 1:
         raise OptionError(
@@ -180,7 +190,7 @@ def hex_mesh(
     if result.torus is None:
         raise OptionError("the map has no torus to lay a grid in")
     points = result.point_map
-    disk, quads, outer = _o_grid(block, rings)
+    disk, quads, outer = o_grid(block, rings)
     n = len(disk)
     u = np.repeat(np.arange(sections) * TWO_PI / sections, n)
     v = np.tile(np.arctan2(disk[:, 1], disk[:, 0]), sections)
@@ -197,51 +207,36 @@ def hex_mesh(
         raise SolverError(f"{len(lost)} points of the grid lie outside the image", lost)
     V = pulled = located.points
     H = H.astype(np.int32)
-    if _core.tet_volumes(np.ascontiguousarray(grid), _corner_tets(H)).sum() < 0.0:
-        H = H[:, [0, 3, 2, 1, 4, 7, 6, 5]]
-    bad = int((~(_jacobians(V, H) > 0.0)).any(axis=1).sum())
-    if bad and repair:
-        V = _repaired(grid, V, H, ids.astype(np.int32), result.torus)
+    if _core.tet_volumes(np.ascontiguousarray(grid), corner_tets(H)).sum() < 0.0:
+        H = np.ascontiguousarray(H[:, [0, 3, 2, 1, 4, 7, 6, 5]])
+    quality = jacobians(V, H)
+    bad = int((~(quality > 0.0)).any(axis=1).sum())
+    shares = hex_volumes(grid, H)
+    shares /= shares.sum()
+    if repair and not quality.min() >= _LEAST:
+        V = _repaired(result, pulled, H, shares, ids.astype(np.int32), u[ids], v[ids])
+        quality = jacobians(V, H)
+        left = np.flatnonzero(~(quality > 0.0).all(axis=1))
+        if len(left):
+            raise SolverError(
+                f"{len(left)} hexahedra could not be made positive; try other numbers of sections, "
+                "block or rings, repair=False returns the grid as it was pulled back",
+                left,
+            )
+    volumes = hex_volumes(V, H)
+    moves = np.linalg.norm(V - pulled, axis=1) / float(np.linalg.norm(np.ptp(pulled, axis=0)))
     return HexMesh(
         V=read_only(V),
-        H=read_only(np.ascontiguousarray(H)),
+        H=read_only(H),
         grid=read_only(grid),
         coordinates=read_only(np.stack(result.torus.coordinates(grid), axis=-1)),
-        jacobians=read_only(_jacobians(V, H)),
+        jacobians=read_only(quality),
+        volumes=read_only(volumes),
+        volume_ratios=read_only(volumes / volumes.sum() / shares),
         n_pulled_back_negative=bad,
-        rim_moved=float(np.linalg.norm((V - pulled)[ids], axis=1).max())
-        / float(np.linalg.norm(np.ptp(pulled, axis=0))),
-        volume=float(_hex_volumes(V, H).sum()),
+        moved=float(moves.max()),
+        rim_moved=float(moves[ids].max()),
     )
-
-
-def _o_grid(
-    block: int, rings: int
-) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]]:
-    """Points of the unit disk (n, 2), quads (q, 4), and the points on the rim."""
-    side = np.linspace(-1.0, 1.0, block + 1)
-    x, y = (a.ravel() for a in np.meshgrid(side, side, indexing="ij"))
-    # The square bulges half-way towards its circumscribed circle.
-    radius = np.maximum(np.abs(x), np.abs(y))
-    round_off = radius * np.sqrt(2.0) / np.maximum(np.hypot(x, y), 1e-300)
-    square = np.stack([x, y], axis=1) * (0.5 + 0.5 * round_off)[:, None] * _SQUARE / np.sqrt(2.0)
-    index = np.arange((block + 1) ** 2).reshape(block + 1, block + 1)
-    inner = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1)
-    rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
-    start = square[rim]
-    angle = np.arctan2(start[:, 1], start[:, 0])
-    end = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    t = np.arange(1, rings + 1)[:, None, None] / rings
-    around = ((1.0 - t) * start + t * end).reshape(-1, 2)
-    layers = np.concatenate(
-        [rim[None], len(square) + np.arange(rings * len(rim)).reshape(rings, -1)]
-    )
-    low, high = layers[:-1], layers[1:]
-    outer_quads = np.stack(
-        [low, high, np.roll(high, -1, axis=1), np.roll(low, -1, axis=1)], axis=-1
-    )
-    quads = np.concatenate([inner.reshape(-1, 4), outer_quads.reshape(-1, 4)])
-    return np.concatenate([square, around]), quads, layers[-1]
 
 
 def _reach(
@@ -258,95 +253,35 @@ def _reach(
     return low
 
 
-def _corner_tets(H: NDArray[np.int32]) -> NDArray[np.int32]:
-    return np.ascontiguousarray(H[:, _CORNERS].reshape(-1, 4))
-
-
-def _jacobians(V: NDArray[np.float64], H: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(k, 8) Jacobians at the corners over the product of the lengths of the edges there."""
-    corners = V[H[:, _CORNERS]]
-    edges = corners[:, :, 1:] - corners[:, :, :1]
-    lengths = np.linalg.norm(edges, axis=-1).prod(axis=-1)
-    return np.linalg.det(edges) / np.maximum(lengths, 1e-300)
-
-
-def _hex_volumes(V: NDArray[np.float64], H: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Volumes of the trilinear hexahedra, by Gauss quadrature that is exact for them."""
-    signs = np.array(
-        [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1],
-         [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float
-    )  # fmt: skip
-    total = np.zeros(len(H))
-    for node in signs / np.sqrt(3.0):
-        factors = 1.0 + signs * node
-        slopes = (
-            np.stack(
-                [signs[:, a] * factors[:, (a + 1) % 3] * factors[:, (a + 2) % 3] for a in range(3)]
-            )
-            / 8.0
-        )
-        total += np.linalg.det(np.einsum("ac,kcx->kax", slopes, V[H]))
-    return total
-
-
 def _repaired(
-    grid: NDArray[np.float64],
+    result: MapResult,
     V: NDArray[np.float64],
     H: NDArray[np.int32],
-    boundary: NDArray[np.int32],
-    torus: Torus,
+    shares: NDArray[np.float64],
+    rim: NDArray[np.int32],
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Points with all corner tets positive, the boundary held but where no inner point can do."""
-    T = _corner_tets(H)
-    sizes = [_hex_volumes(p, H).sum() ** (1.0 / 3.0) for p in (grid, V)]
-    centre = V.mean(axis=0)
-    goal = np.ascontiguousarray((V - centre) / sizes[1])
-
-    def solver(held: NDArray[np.int32]) -> FlipFreeSolver:
-        return FlipFreeSolver(
-            V=np.ascontiguousarray(grid / sizes[0]), T=T, boundary=held,
-            faces=np.zeros((0, 3), np.int32), R=torus.R, r=torus.r,
-            options=FlipFreeOptions(frozen_iter=_ADAPT),
-        )  # fmt: skip
-
-    x, held = goal, boundary
-    for _ in range(_ROUNDS):
-        x, flips = solver(held).untangle(x, glide=False)
-        if not flips:
-            break
-        held = np.setdiff1d(held, T[~(_core.signed_tet_volumes(x, T) > 0.0)])
-    else:
-        raise SolverError(
-            f"{flips} corners of hexahedra could not be made positive; a finer grid may help"
-        )
-    loose = np.setdiff1d(boundary, held)
-    if len(loose):
-        inner = solver(boundary)
-        for _ in range(_ROUNDS):
-            x = _drawn(x, goal, loose, T)
-            x, _, _ = inner.minimise(x, glide=False, start=1.0, goal=1.0)
-    out = x * sizes[1] + centre
-    out[held] = V[held]
-    return out
-
-
-def _drawn(
-    x: NDArray[np.float64], goal: NDArray[np.float64], ids: NDArray[np.int32], T: NDArray[np.int32]
-) -> NDArray[np.float64]:
-    """Each of some points moved to its goal as far as the tets at it stay positive.
-
-    One share of the way for all of them, then halved for those at a tet that would turn over.
-    """
-    floor = 1e-2 * np.abs(_core.signed_tet_volumes(x, T))
-    share = np.zeros(len(x))
-    share[ids] = 1.0
-    for _ in range(_HALVINGS):
-        moved = x + share[:, None] * (goal - x)
-        bad = T[~(_core.signed_tet_volumes(moved, T) > floor)]
-        if not len(bad):
-            return moved
-        share[bad.ravel()] *= 0.5
-    return x
+    """The points after `GridRepair`; u and v are those of the rim."""
+    solid, torus = result.mesh, result.torus
+    surface = FlatSurface.of(solid.surface)
+    angles = np.stack(torus.coordinates(result.image[solid.boundary_vertices])[:2], axis=1)
+    turns = np.ascontiguousarray(angles / TWO_PI)
+    edges = solid.surface.edges
+    # Along an edge the angles change by less than half a turn; the rest is whole turns.
+    forms = np.ascontiguousarray(-np.round(turns[edges[:, 1]] - turns[edges[:, 0]]).T, np.int32)
+    chart = _core.SurfaceChart(solid.surface.topology, forms)
+    at = np.ascontiguousarray(np.stack([u, v], axis=1) / TWO_PI)
+    faces, weights = _core.ChartLocator(chart, turns).locate(at)
+    shift = np.stack([surface.chart.shift_u, surface.chart.shift_v], axis=-1)
+    y = np.einsum("bk,bkc->bc", weights, surface.turns[solid.surface.F[faces]] + shift[faces])
+    # A coarse face may be turned over in plain angles; then the nearest vertex is near enough.
+    lost = np.flatnonzero(faces < 0)
+    if len(lost):
+        y[lost] = surface.turns[cKDTree(solid.surface.V).query(V[rim[lost]])[1]]
+    grid = GridRepair(V, H, shares * solid.volume, rim, surface, np.ascontiguousarray(y))
+    grid.run()
+    return grid.V
 
 
 def transfer(
