@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from itertools import pairwise
 
 import igl
@@ -10,7 +11,7 @@ import pytest
 import scipy.sparse as sp
 
 import stretchmap as sm
-from stretchmap import _core, samples
+from stretchmap import _core, samples, vsem
 from stretchmap.errors import DegenerateError, OptionError
 from stretchmap.mesh import TetMesh
 
@@ -106,6 +107,24 @@ def test_laplacian_does_not_depend_on_the_kernel_or_the_numbering():
     scale = np.abs(plain.data).max()
     assert np.abs(plain[rank][:, rank] - first).max() < 1e-13 * scale
     assert np.allclose(plain_rhs[rank], first_rhs, atol=1e-13 * scale)
+
+
+@pytest.mark.parametrize("c", [0.0, 10.0])
+def test_inexact_steps_lead_to_the_map_of_exact_ones(c):
+    # 20 steps on one hierarchy of grids or two against exact factors at every step.
+    solid = samples.bumpy_torus(30000)
+    fixed = boundary_flags(solid)
+    V = solid.V / solid.volume ** (1 / 3)
+    start = V + 0.2 * np.sin(3.0 * V[:, [1, 2, 0]])
+    run = functools.partial(
+        vsem.minimise_volumetric_stretch, V, solid.T, fixed, start, c=c, max_iter=20, tol=0.0
+    )
+    ours, exact = run(solver="multigrid"), run(solver="direct")
+    energies = [np.array([r.energy for r in result.history]) for result in (ours, exact)]
+    assert len(energies[0]) == 21 and (np.diff(energies[0]) < 0.0).all()
+    assert energies[0][-1] == pytest.approx(energies[1][-1], rel=1e-7)
+    assert np.abs(ours.image - exact.image).max() < 1e-4
+    assert [r.flips for r in ours.history] == [r.flips for r in exact.history]
 
 
 def test_stretch_energy_identities(bumpy):

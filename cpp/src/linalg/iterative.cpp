@@ -32,7 +32,8 @@ void IterativeSolver<B, M>::set_scale(const double* values) {
 template <int B, int M>
 std::vector<Index> IterativeSolver<B, M>::refactor(const double* values, bool keep) {
   LevelMatrix<B>& A = multigrid_.finest();
-  if (keep && ready_) {
+  kept_ = keep && ready_;
+  if (kept_) {
     A.set_product_values(values, scale_);
     return {};
   }
@@ -65,7 +66,8 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
       largest = std::max(largest, std::abs(b[static_cast<size_t>(stride) * row + k]));
     if (largest > 0.0 && std::isfinite(largest)) factor[k] = std::ldexp(1.0, -std::ilogb(largest));
   }
-  std::vector<double> inner_b(n * B * K, 0.0), inner_x(n * B * K, 0.0);
+  inner_b_.assign(n * B * K, 0.0);
+  inner_x_.assign(n * B * K, 0.0);
   const auto each = [&](const auto& visit) {
     for_chunks(A.n, [&](Index begin, Index end) {
       for (size_t i = begin; i < static_cast<size_t>(end); ++i)
@@ -76,8 +78,8 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
     });
   };
   each([&](size_t in, size_t out, double f) {
-    inner_b[in] = f * b[out];
-    inner_x[in] = f / scale_ * x[out];
+    inner_b_[in] = f * b[out];
+    inner_x_[in] = f / scale_ * x[out];
   });
   const PcgSystem<K> system{
       A.n * B, [&](const double* p, double* q) { return A.template multiply<K>(p, q); },
@@ -87,10 +89,11 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
         else
           multigrid_.template precondition<K>(r, z);
       }};
-  const PcgResult<K> result = pcg<K>(system, inner_b.data(), inner_x.data(), options, poll);
+  const PcgResult<K> result =
+      pcg<K>(system, inner_b_.data(), inner_x_.data(), vectors_, options, poll);
   if (result.finite)
-    each([&](size_t in, size_t out, double f) { x[out] = scale_ / f * inner_x[in]; });
-  watch_.observe(result.iterations, result.digits);
+    each([&](size_t in, size_t out, double f) { x[out] = scale_ / f * inner_x_[in]; });
+  if (!kept_) watch_.observe(result.iterations, result.digits);
   return result;
 }
 

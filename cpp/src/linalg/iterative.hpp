@@ -37,6 +37,10 @@ class IterativeSolver {
   Multigrid<B, M> multigrid_;  // with the diagonal alone only its finest level is used
   ConvergenceWatch watch_;
   bool ready_ = false;
+  bool kept_ =
+      false;  // the hierarchy belongs to earlier values: how it does says nothing of its age
+  std::vector<double> inner_b_, inner_x_;  // kept, like the vectors, for the next solve
+  PcgVectors vectors_;
   double scale_ = 1.0;  // power of two that brings the diagonal near one
 };
 

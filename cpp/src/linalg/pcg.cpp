@@ -72,9 +72,9 @@ struct Run {
   const PcgSystem<K>& system;
   const double* b;
   double* x;
+  std::vector<double>&r, &p, &q;
+  std::vector<float>&r_f, &z;
   Scalars<K> goal{};  // squared residual aimed at
-  std::vector<double> r{}, p{}, q{};
-  std::vector<float> r_f{}, z{};
   Scalars<K> rr{};
   PcgResult<K> result{};
 
@@ -128,13 +128,14 @@ struct Run {
 }  // namespace
 
 template <int K>
-PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x,
+PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVectors& vectors,
                  const SolveOptions& options, const Poll& poll) {
   const Index n = system.n;
   const std::size_t size = static_cast<std::size_t>(n) * K;
   const Scalars<K> bb = dots<K>(n, b, b);
-  Run<K> run{system, b, x};
-  for (std::vector<double>* vector : {&run.r, &run.p, &run.q}) vector->resize(size);
+  Run<K> run{system, b, x, vectors.r, vectors.p, vectors.q, vectors.r_f, vectors.z};
+  run.p.assign(size, 0.0);
+  for (std::vector<double>* vector : {&run.r, &run.q}) vector->resize(size);
   for (std::vector<float>* vector : {&run.r_f, &run.z}) vector->resize(size);
   if (!(run.result.finite = all_finite<K>(bb))) return run.result;
   for (int k = 0; k < K; ++k) {
@@ -161,11 +162,11 @@ PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x,
   return run.result;
 }
 
-template PcgResult<1> pcg<1>(const PcgSystem<1>&, const double*, double*, const SolveOptions&,
-                             const Poll&);
-template PcgResult<2> pcg<2>(const PcgSystem<2>&, const double*, double*, const SolveOptions&,
-                             const Poll&);
-template PcgResult<4> pcg<4>(const PcgSystem<4>&, const double*, double*, const SolveOptions&,
-                             const Poll&);
+template PcgResult<1> pcg<1>(const PcgSystem<1>&, const double*, double*, PcgVectors&,
+                             const SolveOptions&, const Poll&);
+template PcgResult<2> pcg<2>(const PcgSystem<2>&, const double*, double*, PcgVectors&,
+                             const SolveOptions&, const Poll&);
+template PcgResult<4> pcg<4>(const PcgSystem<4>&, const double*, double*, PcgVectors&,
+                             const SolveOptions&, const Poll&);
 
 }  // namespace stretchmap::linalg

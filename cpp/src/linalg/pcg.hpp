@@ -4,6 +4,7 @@
 
 #include <array>
 #include <functional>
+#include <vector>
 
 #include "stretchmap/linalg/solve.hpp"
 
@@ -27,16 +28,22 @@ struct PcgResult {
   bool finite = true;                // false: a NaN or an infinity was met
 };
 
+// Vectors of one run, kept by the caller so that the next one finds its memory in place.
+struct PcgVectors {
+  std::vector<double> r, p, q;
+  std::vector<float> r_f, z;
+};
+
 // x: warm start in, solution out. A column with b = 0 gives x = 0 and residual 0.
 template <int K>
-PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x,
+PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVectors& vectors,
                  const SolveOptions& options, const Poll& poll);
 
-extern template PcgResult<1> pcg<1>(const PcgSystem<1>&, const double*, double*,
+extern template PcgResult<1> pcg<1>(const PcgSystem<1>&, const double*, double*, PcgVectors&,
                                     const SolveOptions&, const Poll&);
-extern template PcgResult<2> pcg<2>(const PcgSystem<2>&, const double*, double*,
+extern template PcgResult<2> pcg<2>(const PcgSystem<2>&, const double*, double*, PcgVectors&,
                                     const SolveOptions&, const Poll&);
-extern template PcgResult<4> pcg<4>(const PcgSystem<4>&, const double*, double*,
+extern template PcgResult<4> pcg<4>(const PcgSystem<4>&, const double*, double*, PcgVectors&,
                                     const SolveOptions&, const Poll&);
 
 }  // namespace stretchmap::linalg

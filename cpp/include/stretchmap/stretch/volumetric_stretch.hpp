@@ -28,12 +28,18 @@ class VolumetricStretch {
   std::string backend() const { return solver_ ? solver_->backend() : std::string(); }
 
  private:
+  SolveReport solve_kept(const SolveOptions& options, const Poll& poll);
   SolveReport solve(const PointsRef& geometry, double c, Points& x, const SolveOptions& options,
                     const Poll& poll);
 
   TetLaplacian laplacian_;
   std::string wanted_backend_;
   std::unique_ptr<SpdSolver> solver_;
+  Points rhs_;
+  Rows unknowns_;
+  int solves_ = 0;    // so far
+  int fresh_ = 0;     // iterations of the first solve after the preconditioner was renewed
+  bool worn_ = true;  // whether the last solve took clearly more than that
 };
 
 }  // namespace stretchmap
