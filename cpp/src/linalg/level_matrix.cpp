@@ -147,9 +147,19 @@ void LevelMatrix<B>::set_excess() {
 template <int B>
 template <int K>
 std::array<double, K> LevelMatrix<B>::multiply(const double* x, double* y) const {
+  static_assert(B == 1 || K == 1);
   constexpr size_t kBlock = B * B, kRow = B * K;
   return sum_chunks<K>(n, [&](Index begin, Index end, std::array<double, K>& dots) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
+      if constexpr (K > 1) {
+        Lanes<double, K> total = diagonal[i] * lanes<K>(x + K * i);
+        for (size_t e = start[i]; e < static_cast<size_t>(start[i + 1]); ++e)
+          total += value[e] * lanes<K>(x + K * col[e]);
+        Eigen::Map<Lanes<double, K>>(y + K * i) = total;
+        total *= lanes<K>(x + K * i);
+        for (int k = 0; k < K; ++k) dots[k] += total[k];
+        continue;
+      }
       double sum[kRow] = {};
       const auto add = [&](const double* block, const double* xe) {
         for (int r = 0; r < B; ++r)

@@ -11,6 +11,15 @@
 
 namespace stretchmap::linalg {
 
+// N numbers that are added and multiplied together. A loop of rows over them has to be told, or the
+// compiler takes several entries of a row at once, which are too few.
+template <class Real, int N>
+using Lanes = Eigen::Array<Real, N, 1>;
+template <int N, class Real>
+Eigen::Map<const Lanes<Real, N>> lanes(const Real* from) {
+  return Eigen::Map<const Lanes<Real, N>>(from);
+}
+
 inline constexpr Index kChunk = 2048;  // rows per chunk
 
 inline Index chunk_count(Index n, Index size = kChunk) { return (n + size - 1) / size; }

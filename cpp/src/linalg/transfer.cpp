@@ -222,13 +222,22 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const
   return values;
 }
 
+// Several columns (N > 1) come with single unknowns only.
 template <int B, int K>
 template <int N>
 void Transfer<B, K>::restrict_to(const float* r_fine, float* b) const {
+  static_assert(N == 1 || (B == 1 && K == 1));
   for_chunks(
       r.rows(),
       [&](Index begin, Index end) {
         for (Index a = begin; a < end; ++a) {
+          if constexpr (N > 1) {
+            Lanes<float, N> total = Lanes<float, N>::Zero();
+            for (Index e = r.start[a]; e < r.start[a + 1]; ++e)
+              total += r_value[e] * lanes<N>(r_fine + static_cast<size_t>(N) * r.col[e]);
+            Eigen::Map<Lanes<float, N>>(b + static_cast<size_t>(N) * a) = total;
+            continue;
+          }
           float sum[K * N] = {};
           for (Index e = r.start[a]; e < r.start[a + 1]; ++e) {
             const float* block = r_value.data() + static_cast<size_t>(B * K) * e;
@@ -247,8 +256,16 @@ void Transfer<B, K>::restrict_to(const float* r_fine, float* b) const {
 template <int B, int K>
 template <int N>
 void Transfer<B, K>::prolong_add(const float* c, const float* x, float* y) const {
+  static_assert(N == 1 || (B == 1 && K == 1));
   for_chunks(p.rows(), [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
+      if constexpr (N > 1) {
+        Lanes<float, N> total = lanes<N>(x + static_cast<size_t>(N) * i);
+        for (Index e = p.start[i]; e < p.start[i + 1]; ++e)
+          total += p_value[e] * lanes<N>(c + static_cast<size_t>(N) * p.col[e]);
+        Eigen::Map<Lanes<float, N>>(y + static_cast<size_t>(N) * i) = total;
+        continue;
+      }
       float sum[B * N];
       for (int k = 0; k < B * N; ++k) sum[k] = x[static_cast<size_t>(B * N) * i + k];
       for (Index e = p.start[i]; e < p.start[i + 1]; ++e) {
