@@ -29,7 +29,7 @@ from scipy_vsem import face_vectors, minimise
 import stretchmap as sm
 from stretchmap import _core, samples
 from stretchmap.mesh import TetMesh
-from stretchmap.vsem import STEP_TOL
+from stretchmap.vsem import HARMONIC_TOL, step_tolerance
 
 HERE = Path(__file__).resolve().parent
 FOLDER = Path(os.environ.get("STRETCHMAP_MESHES", HERE.parents[2] / "shared" / "meshes")) / "tets"
@@ -39,10 +39,18 @@ def ours(V: Any, T: Any, fixed: Any, start: Any, c: float, steps: int) -> tuple[
     """The library's kernels, as volume_map drives them."""
     rest = _core.signed_tet_volumes(V, T)
     stretch = _core.VolumetricStretch(T, fixed.astype(np.uint8), rest, "auto")
-    x, _ = stretch.harmonic(V, start, 1e-8)
+
+    def energy_of(x: Any) -> float:
+        return float(_core.tet_stretch_energy(_core.signed_tet_volumes(x, T), rest))
+
+    x, _ = stretch.harmonic(V, start, HARMONIC_TOL)
+    energy = energy_of(x)
+    tol = step_tolerance(np.inf, energy)
     begin = time.perf_counter()
     for _ in range(steps):
-        x, _ = stretch.step(x, c, STEP_TOL)
+        x, _ = stretch.step(x, c, tol)
+        before, energy = energy, energy_of(x)
+        tol = step_tolerance(before, energy)
     return x, time.perf_counter() - begin
 
 

@@ -19,8 +19,13 @@ __all__ = ["VsemRun", "minimise_volumetric_stretch"]
 # what it leaves open the next one makes good; the less the last step changed the energy, the more
 # exact the next one has to be. After 20 steps the energy agrees to 1e-7 with that of exact solves.
 HARMONIC_TOL = 1e-8
-STEP_SHARE = 2e-5
-STEP_TOL = (1e-9, 1e-6)
+_STEP_SHARE = 2e-5
+_STEP_TOL = (1e-9, 1e-6)
+
+
+def step_tolerance(before: float, energy: float) -> float:
+    """Relative residual asked of the next step, the last one having lowered the energy so far."""
+    return min(max(_STEP_SHARE * (before - energy) / energy, _STEP_TOL[0]), _STEP_TOL[1])
 
 
 @dataclass(frozen=True)
@@ -117,14 +122,14 @@ def minimise_volumetric_stretch(
         x, solved = stretch.harmonic(V, x, HARMONIC_TOL)
         residual = float(max(solved.residual, default=0.0))
     energy = record(x, 0, residual)
-    step_tol = STEP_TOL[1]
+    step_tol = step_tolerance(math.inf, energy)
     for iteration in range(1, max_iter + 1):
         moved, solved = stretch.step(x, c, step_tol)
         x, before = moved, energy
         energy = record(x, iteration, float(max(solved.residual, default=0.0)))
         if energy > before:
             return VsemRun(x, tuple(history), False, "the energy rose")
-        step_tol = min(max(STEP_SHARE * (before - energy) / energy, STEP_TOL[0]), STEP_TOL[1])
+        step_tol = step_tolerance(before, energy)
         if before - energy <= tol * energy:
             return VsemRun(x, tuple(history), True, "the energy stopped decreasing")
     return VsemRun(x, tuple(history), False, "most iterations done")
