@@ -156,8 +156,8 @@ def register(
         Stop the surface matching when a step lowers its energy by no more than this share.
     keep_best : bool
         Return the map even if it is not certified.
-    solver : {"auto", "direct", "multigrid", "jacobi"}
-        Linear solver of the harmonic and fixed-point steps.
+    solver : {"auto", "direct", "multigrid", "jacobi", "cholmod"}
+        Linear solver of the harmonic and fixed-point steps; the last in builds that have it.
     options : FlipFreeOptions, optional
         Knobs of the volume optimisation.
     progress : Progress, optional

@@ -175,8 +175,8 @@ def volume_map(
         can repair. False: refuse such a mesh.
     keep_best : bool
         Return the best map found even if it is not certified.
-    solver : {"auto", "direct", "multigrid", "jacobi"}
-        Linear solver of the harmonic and fixed-point steps.
+    solver : {"auto", "direct", "multigrid", "jacobi", "cholmod"}
+        Linear solver of the harmonic and fixed-point steps; the last in builds that have it.
     options : FlipFreeOptions, optional
         Finer knobs of the certified route.
     threads : int, optional

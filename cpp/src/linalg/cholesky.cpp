@@ -1,5 +1,6 @@
 #include "cholesky.hpp"
 
+#include "refined_solve.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap::linalg {
@@ -58,29 +59,8 @@ void Cholesky::substitute(const double* B, double* X) {
 template <int K>
 PcgResult<K> Cholesky::solve(const SparseMatrix& A, const double* B, double* X,
                              const SolveOptions& options) {
-  using Columns =
-      Eigen::Matrix<double, Eigen::Dynamic, K, K == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
-  const Eigen::Map<const Columns> b(B, A.rows(), K);
-  Eigen::Map<Columns> x(X, A.rows(), K);
-  PcgResult<K> result;
-  substitute<K>(B, X);
-  Columns residual = b - A * x, correction(A.rows(), K);
-  const auto size = b.colwise().norm().eval();
-  auto error = residual.colwise().norm().eval();
-  while (result.iterations < std::min(3, options.max_iter) &&
-         (error.array() > options.tol * size.array()).any()) {
-    substitute<K>(residual.data(), correction.data());
-    const Columns refined = x + correction;
-    residual = b - A * refined;
-    const auto refined_error = residual.colwise().norm().eval();
-    if (!(refined_error.sum() < error.sum())) break;
-    x = refined;
-    error = refined_error;
-    ++result.iterations;
-  }
-  for (int k = 0; k < K; ++k) result.residual[k] = size[k] > 0.0 ? error[k] / size[k] : 0.0;
-  result.finite = x.allFinite() && error.allFinite();
-  return result;
+  return refined_solve<K>(A, B, X, options,
+                          [this](const double* b, double* x) { substitute<K>(b, x); });
 }
 
 template PcgResult<1> Cholesky::solve(const SparseMatrix&, const double*, double*,

@@ -13,8 +13,7 @@ class Cholesky {
   explicit Cholesky(const SparseMatrix& A);
   void refactor(const SparseMatrix& A);
 
-  // X = A^-1 B, B and X (n, K) row-major, followed by at most three steps of refinement towards
-  // the goal; the result's iterations count these.
+  // X = A^-1 B, B and X (n, K) row-major, refined: see refined_solve.hpp.
   template <int K>
   PcgResult<K> solve(const SparseMatrix& A, const double* B, double* X,
                      const SolveOptions& options);

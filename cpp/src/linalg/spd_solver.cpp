@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "cholesky.hpp"
+#include "cholmod.hpp"
 #include "iterative.hpp"
+#include "refined_solve.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap {
@@ -65,6 +67,7 @@ struct SpdSolver::State {
   SparseMatrix A;
   std::string backend;
   std::optional<Cholesky> cholesky;
+  std::optional<Cholmod> cholmod;
   std::optional<IterativeSolver<1, 1>> iterative;
 
   template <int K>
@@ -78,9 +81,9 @@ SpdSolver::SpdSolver(SparseMatrix A, const SpdOptions& options)
   state_->A = std::move(A);
   state_->backend = options.backend == "auto" ? choose_backend(state_->A) : options.backend;
   const std::string& backend = state_->backend;
-  if (backend != "direct" && backend != "multigrid" && backend != "jacobi")
-    throw Error("OptionError",
-                "unknown solver '" + backend + "': choose auto, direct, multigrid or jacobi");
+  if (backend != "direct" && backend != "multigrid" && backend != "jacobi" && backend != "cholmod")
+    throw Error("OptionError", "unknown solver '" + backend +
+                                   "': choose auto, direct, multigrid, jacobi or cholmod");
   require_positive_diagonal(state_->A);
   refactor();
 }
@@ -101,6 +104,13 @@ void SpdSolver::refactor(bool keep_preconditioner) {
       s.cholesky->refactor(s.A);
     else
       s.cholesky.emplace(s.A);
+    return;
+  }
+  if (s.backend == "cholmod") {
+    if (s.cholmod)
+      s.cholmod->refactor(s.A);
+    else
+      s.cholmod.emplace(s.A);
     return;
   }
   const Index n = static_cast<Index>(s.A.rows());
@@ -126,7 +136,11 @@ PcgResult<K> SpdSolver::State::columns(const RowsRef& B, Eigen::Ref<Rows>& X, In
       Eigen::Matrix<double, Eigen::Dynamic, K, K == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
   Columns b = Columns::Zero(B.rows(), K), x(B.rows(), K);
   b.leftCols(used) = B.middleCols(first, used);
-  const PcgResult<K> result = cholesky->template solve<K>(A, b.data(), x.data(), options);
+  const PcgResult<K> result = cholesky ? cholesky->template solve<K>(A, b.data(), x.data(), options)
+                                       : refined_solve<K>(A, b.data(), x.data(), options,
+                                                          [&](const double* from, double* to) {
+                                                            cholmod->substitute(from, to, K);
+                                                          });
   X.middleCols(first, used) = x.leftCols(used);
   return result;
 }

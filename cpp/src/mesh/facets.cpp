@@ -7,19 +7,37 @@
 namespace stretchmap {
 namespace {
 
+// All but the lowest vertex of a facet in ascending order, packed, and the facet.
+template <std::size_t N>
 struct Key {
-  std::uint64_t high;  // the second (and third) lowest vertex
-  std::uint64_t low;   // the fourth lowest vertex, for whole tets
+  std::uint64_t high;  // second and third lowest vertex
+  std::uint32_t low;   // fourth, for whole tets
   Index facet;
+
+  Key() = default;
+  Key(const std::array<Index, N>& c, Index f)
+      : high(static_cast<std::uint64_t>(c[1]) << 32 | static_cast<std::uint32_t>(c[2])),
+        low(static_cast<std::uint32_t>(c[N - 1])),
+        facet(f) {}
+  bool same(const Key& other) const { return high == other.high && low == other.low; }
+  bool operator<(const Key& other) const {
+    if (high != other.high) return high < other.high;
+    return low != other.low ? low < other.low : facet < other.facet;
+  }
 };
 
-bool same(const Key& a, const Key& b) { return a.high == b.high && a.low == b.low; }
+template <>
+struct Key<2> {
+  std::uint32_t high;
+  Index facet;
 
-bool before(const Key& a, const Key& b) {
-  if (a.high != b.high) return a.high < b.high;
-  if (a.low != b.low) return a.low < b.low;
-  return a.facet < b.facet;
-}
+  Key() = default;
+  Key(const std::array<Index, 2>& c, Index f) : high(static_cast<std::uint32_t>(c[1])), facet(f) {}
+  bool same(const Key& other) const { return high == other.high; }
+  bool operator<(const Key& other) const {
+    return high != other.high ? high < other.high : facet < other.facet;
+  }
+};
 
 // corners(facet) returns the ids of a facet in any order; `used(facet)` says whether it counts.
 // Counting sort by the lowest id, then a short sort inside each bucket.
@@ -36,26 +54,23 @@ FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used, 
     ++bucket[*std::min_element(c.begin(), c.end()) + 1];
   }
   for (Index i = 0; i < n_vertices; ++i) bucket[i + 1] += bucket[i];
-  std::vector<Key> keys(bucket[n_vertices]);
+  std::vector<Key<N>> keys(bucket[n_vertices]);
   std::vector<Index> cursor(bucket.begin(), bucket.end() - 1);
   for (Index h = 0; h < n_facets; ++h) {
     now_and_then(h, 262144);
     if (!used(h)) continue;
     std::array<Index, N> c = corners(h);
     std::sort(c.begin(), c.end());
-    Key key{static_cast<std::uint64_t>(c[1]) << 32, 0, h};
-    if constexpr (N > 2) key.high |= static_cast<std::uint64_t>(c[2]);
-    if constexpr (N > 3) key.low = static_cast<std::uint64_t>(c[3]);
-    keys[cursor[c[0]]++] = key;
+    keys[cursor[c[0]]++] = Key<N>(c, h);
   }
   FacetGroups groups;
   groups.order.resize(keys.size());
   groups.start.reserve(keys.size() / 2 + 1);
   for (Index i = 0; i < n_vertices; ++i) {
     now_and_then(i, 16384);
-    std::sort(keys.begin() + bucket[i], keys.begin() + bucket[i + 1], before);
+    std::sort(keys.begin() + bucket[i], keys.begin() + bucket[i + 1]);
     for (Index p = bucket[i]; p < bucket[i + 1]; ++p) {
-      if (p == bucket[i] || !same(keys[p - 1], keys[p])) groups.start.push_back(p);
+      if (p == bucket[i] || !keys[p].same(keys[p - 1])) groups.start.push_back(p);
       groups.order[p] = keys[p].facet;
     }
   }

@@ -41,6 +41,7 @@ class Solver(str, Enum):
     direct = "direct"
     multigrid = "multigrid"
     jacobi = "jacobi"
+    cholmod = "cholmod"
 
 
 class Finish(str, Enum):

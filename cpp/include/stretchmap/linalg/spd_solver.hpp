@@ -13,6 +13,7 @@ struct SpdOptions {
   // "direct"     sparse Cholesky, approximate-minimum-degree ordering: surfaces, small solids.
   // "multigrid"  conjugate gradients with smoothed aggregation: solids; cost linear in the mesh.
   // "jacobi"     conjugate gradients with the diagonal: cheapest setup, for checks.
+  // "cholmod"    supernodal sparse Cholesky of SuiteSparse, in builds that have it.
   // "auto"       direct for small systems and for surface-like ones (few entries per row, small
   //              fill), else multigrid.
   std::string backend = "auto";
@@ -30,7 +31,8 @@ struct SpdOptions {
 class SpdSolver {
  public:
   // \pre A square, compressed, structurally symmetric, both triangles stored, diagonal present.
-  // \throws OptionError (unknown backend), SolverError (not symmetric, not positive definite, not
+  // \throws OptionError (unknown backend), MissingDependencyError (no CHOLMOD), SolverError (not
+  // symmetric, not positive definite, not
   //         finite; ids are rows where a culprit is known).
   explicit SpdSolver(SparseMatrix A, const SpdOptions& options = {});
   ~SpdSolver();
@@ -53,7 +55,7 @@ class SpdSolver {
   SolveReport solve(const RowsRef& B, Eigen::Ref<Rows> X, const SolveOptions& options = {},
                     const Poll& poll = {});
 
-  // The backend chosen: "direct", "multigrid" or "jacobi".
+  // The backend chosen: as in SpdOptions, not "auto".
   const std::string& backend() const;
 
  private:

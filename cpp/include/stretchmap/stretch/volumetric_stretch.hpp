@@ -24,7 +24,7 @@ class VolumetricStretch {
   // One step of (5.5) with the regularisation c >= 0 of (5.6), warm-started from x.
   SolveReport step(Points& x, double c, const SolveOptions& options, const Poll& poll = {});
 
-  // "direct", "multigrid" or "jacobi"; empty before the first solve.
+  // As in SpdOptions, not "auto"; empty before the first solve.
   std::string backend() const { return solver_ ? solver_->backend() : std::string(); }
 
  private:
