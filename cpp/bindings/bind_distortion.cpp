@@ -21,6 +21,8 @@ void bind_distortion(py::module_& m) {
   m.def("level_histogram", &level_histogram, py::arg("tets").noconvert(),
         py::arg("values").noconvert(), py::arg("amounts").noconvert(), py::arg("bins"),
         py::arg("period"), py::arg("periodic"), release_gil());
+  m.def("level_lookup", &level_lookup, py::arg("tets").noconvert(), py::arg("values").noconvert(),
+        py::arg("table").noconvert(), py::arg("period"), py::arg("periodic"), release_gil());
 }
 
 }  // namespace stretchmap::bindings

@@ -98,6 +98,14 @@ void bind_volume(py::module_& m) {
           },
           py::arg("x").noconvert(), py::arg("weights"), release_gil())
       .def(
+          "set_targets",
+          [](SolidNewton& self, const VecRef& target) {
+            if (target.size() != self.energy().tets() || !(target.array() > 0.0).all())
+              throw Error("ArrayError", "a positive target is needed for every tet");
+            self.set_targets(target);
+          },
+          py::arg("target").noconvert(), release_gil())
+      .def(
           "step",
           [](SolidNewton& self, Points x, const EnergyWeights& w, double tol, int max_cg,
              bool keep_hessian) {

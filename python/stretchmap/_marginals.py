@@ -1,15 +1,19 @@
-"""Exact distribution of the volume along each coordinate of the solid torus.
+"""How the volume is distributed along each coordinate of the solid torus.
 
 A minimiser of volume distortion balances many elements with a few that cannot be helped, most of
 them at the boundary, and so the volume between two level surfaces of u, v or s is off by up to a
-few tenths of a per cent. Moving the level surfaces themselves mends that: each coordinate is
-replaced by a function of it, chosen so that every level has as much image volume below it as source
-volume. The functions are within a few thousandths of the identity, the torus is mapped to itself.
+few tenths of a per cent. Two means against that:
+
+- multipliers: the volume asked of every tet is multiplied by a function of the level it lies at,
+  raised where a bin of levels has too little image volume and lowered where it has too much. The
+  minimiser does what can be done at the least cost, in the layer of tets at the boundary too, but
+  reacts slowly;
+- shifts: each coordinate is replaced by a function of it, within a few ten-thousandths of the
+  identity, chosen so that every level has as much image volume below it as source volume. That is
+  exact at once, but within the layer at the boundary there is nothing to shift.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +25,13 @@ from .torus import TWO_PI, Torus
 __all__ = ["Marginals"]
 
 _BINS = (8, 64)
+_TARGETS = (0.8, 1.25)  # what more is missing is beyond a correction
 
 
-@dataclass(frozen=True)
 class Marginals:
-    """Volume of a solid along the coordinates of its image.
+    """Volume of a solid and of its image along u, v and s, and how to equalise them.
 
-    Attributes
+    Parameters
     ----------
     T : ndarray of int32, shape (k, 4)
     shares : ndarray, shape (k,)
@@ -36,25 +40,44 @@ class Marginals:
         Vertices whose images lie on the torus.
     torus : Torus
     held : bool
-        Whether the boundary vertices have to stay where they are; then only s can be replaced.
+        Whether the boundary vertices have to stay where they are; then only s can be shifted.
     """
 
-    T: NDArray[np.int32]
-    shares: NDArray[np.float64]
-    boundary: NDArray[np.int32]
-    torus: Torus
-    held: bool
+    def __init__(
+        self,
+        T: NDArray[np.int32],
+        shares: NDArray[np.float64],
+        boundary: NDArray[np.int32],
+        torus: Torus,
+        *,
+        held: bool,
+    ) -> None:
+        self.T, self.shares, self.boundary, self.torus = T, shares, boundary, torus
+        self.held = held
+        # About one bin per layer of tets.
+        bins = int(np.clip(round(len(T) ** (1.0 / 3.0)), *_BINS))
+        self.multipliers = np.zeros((3, bins))
 
-    @property
-    def bins(self) -> int:
-        """Levels per coordinate: about one per layer of tets."""
-        return int(np.clip(round(len(self.T) ** (1.0 / 3.0)), *_BINS))
+    def coordinates(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """``(s / r)^2``, ``u`` and ``v`` of every vertex; the first is the share of the volume."""
+        u, v, s = self.torus.coordinates(x)
+        level = (s / self.torus.r) ** 2
+        level[self.boundary] = 1.0
+        return level, u, v
 
-    def equalise(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Replace each coordinate by the function of it that makes its marginal exact.
+    def error(self, x: NDArray[np.float64]) -> float:
+        """Largest difference between image and source volume below any level.
 
-        Each coordinate is treated as if the others stayed, so what one leaves of another is of
-        second order; call again to remove it.
+        As a share of the whole; for angles up to a constant, since any level may be the first.
+        """
+        return max(
+            float(np.abs(below).max())
+            for values, period in zip(self.coordinates(x), (1.0, TWO_PI, TWO_PI), strict=True)
+            for below in [self._below(*self._histograms(x, values, period), period)]
+        )
+
+    def targets(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Update the multipliers; the volume to ask of each tet, relative to its share.
 
         Parameters
         ----------
@@ -63,53 +86,82 @@ class Marginals:
 
         Returns
         -------
-        x : ndarray, shape (n, 3)
-        error : float
-            Largest difference between image and source volume below any level before the move, as a
-            share of the whole; for angles up to a constant.
+        ndarray, shape (k,)
         """
-        error = 0.0
-        for axis in "s" if self.held else "suv":
-            u, v, s = self.torus.coordinates(x)
-            level = (s / self.torus.r) ** 2
-            level[self.boundary] = 1.0
-            volumes = _core.signed_tet_volumes(x, self.T)
-            if axis == "s":
-                missing = self._missing(level, 1.0, volumes)
+        targets = np.ones(len(self.T))
+        for values, period, table in zip(
+            self.coordinates(x), (1.0, TWO_PI, TWO_PI), self.multipliers, strict=True
+        ):
+            source, image = self._histograms(x, values, period)
+            table += np.divide(source - image, source, where=source > 0.0, out=np.zeros_like(table))
+            targets += _core.level_lookup(self.T, values, table, period, period == TWO_PI)
+        return np.clip(targets, *_TARGETS)
+
+    def shifted(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Replace each coordinate by the function of it that makes its marginal exact.
+
+        Each is treated as if the others stayed, and as if image volume moved as it does between the
+        layers of a fine mesh: call again to remove what that leaves.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n, 3)
+            Image.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            The torus is mapped to itself.
+        """
+        for axis in range(1 if self.held else 3):
+            level, u, v = self.coordinates(x)
+            if axis == 0:
                 # A chord of the torus can leave it, and a vertex near the chord with it.
-                level = level + np.where(level < 1.0, missing(level), 0.0)
-            elif axis == "u":
-                missing = self._missing(u, TWO_PI, volumes)
-                u = u + TWO_PI * missing(u)
+                shift = self._missing(x, level, 1.0)(level)
+                level = np.maximum(level + np.where(level < 1.0, shift, 0.0), 0.0)
+            elif axis == 1:
+                u = u + TWO_PI * self._missing(x, u, TWO_PI)(u)
             else:
-                missing = self._missing(v, TWO_PI, volumes)
                 # Volume per angle of a sector of the solid torus, relative to the mean.
-                v = v + TWO_PI * missing(v) / (1.0 + np.cos(v) / (1.5 * self.torus.ratio))
-            error = max(error, float(np.abs(missing.c[-1]).max()))
-            moved = self.torus.xi(u, v, self.torus.r * np.sqrt(np.maximum(level, 0.0)))
+                density = 1.0 + np.cos(v) / (1.5 * self.torus.ratio)
+                v = v + TWO_PI * self._missing(x, v, TWO_PI)(v) / density
+            moved = self.torus.xi(u, v, self.torus.r * np.sqrt(level))
             if self.held:
                 moved[self.boundary] = x[self.boundary]
             x = moved
-        return x, error
+        return x
+
+    def _histograms(
+        self, x: NDArray[np.float64], values: NDArray[np.float64], period: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Source and image volume in the bins of one coordinate, each summing to 1."""
+        volumes = _core.signed_tet_volumes(x, self.T)
+        volumes /= volumes.sum()
+        bins = self.multipliers.shape[1]
+        source, image = (
+            _core.level_histogram(self.T, values, amounts, bins, period, period == TWO_PI)
+            for amounts in (self.shares, volumes)
+        )
+        return source, image
+
+    @staticmethod
+    def _below(
+        source: NDArray[np.float64], image: NDArray[np.float64], period: float
+    ) -> NDArray[np.float64]:
+        """Source minus image volume below the bins' ends, 0 and the whole included."""
+        below = np.concatenate([[0.0], np.cumsum(source - image)[:-1], [0.0]])
+        if period == TWO_PI:
+            below -= below[1:].mean()  # so that shifts move the levels by nothing on average
+        return below
 
     def _missing(
-        self, value: NDArray[np.float64], period: float, volumes: NDArray[np.float64]
+        self, x: NDArray[np.float64], values: NDArray[np.float64], period: float
     ) -> PchipInterpolator:
-        """Source minus image volume below a level, as a function of the level."""
-        angle = period == TWO_PI
-        bins = self.bins
-        excess = self.shares - volumes / volumes.sum()
-        missing = np.zeros(bins + 1)
-        missing[1:-1] = np.cumsum(
-            _core.level_histogram(self.T, value, excess, bins, period, angle)
-        )[:-1]
-        levels = np.linspace(0.0, period, bins + 1)
-        if not angle:
-            return PchipInterpolator(levels, missing)
-        # The constant is free; this one moves the levels by nothing on average. Two more levels at
-        # either end make the slopes agree where the angle closes up.
-        missing -= missing[1:].mean()
-        inner = missing[:-1]
-        around = np.concatenate([inner[-2:], missing, inner[1:3]])
-        step = levels[1]
-        return PchipInterpolator(np.arange(-2, bins + 3) * step, around)
+        """`_below` as a function of the level."""
+        below = self._below(*self._histograms(x, values, period), period)
+        step = period / (len(below) - 1)
+        if period != TWO_PI:
+            return PchipInterpolator(np.arange(len(below)) * step, below)
+        # Two more levels at either end make the slopes agree where the angle closes up.
+        around = np.concatenate([below[-3:-1], below, below[1:3]])
+        return PchipInterpolator(np.arange(-2, len(below) + 2) * step, around)

@@ -28,7 +28,6 @@ __all__ = ["FlipFreeOptions", "FlipFreeSolver"]
 _FREE, _FIXED, _GLIDING = 0, 1, 2
 _PATIENCE = 10  # untangling steps without progress before something else is tried
 _RESTARTS = 3  # of the continuation, from a large epsilon
-_SWEEPS = 12  # over the coordinates; the first does most, the others the layer at the boundary
 _NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
 
 
@@ -51,6 +50,8 @@ class FlipFreeOptions:
         slivers: their shape is not asked to be kept.
     untangle_iter, frozen_iter, glide_iter : int
         Most steps of each stage.
+    target_iter, shift_iter : int
+        Steps of each kind that equalise the volumes along u, v and s.
     floor : float
         Least determinant untangling aims for: a start closer to folding than that makes the barrier
         too steep for rounded arithmetic.
@@ -73,6 +74,8 @@ class FlipFreeOptions:
     untangle_iter: int = 200
     frozen_iter: int = 150
     glide_iter: int = 60
+    target_iter: int = 8
+    shift_iter: int = 4
     floor: float = 1e-3
     glide_tol: float = 2e-3
     frozen_tol: float = 5e-4
@@ -117,6 +120,7 @@ class FlipFreeSolver:
         self._shares = volumes / volumes.sum()
         self._rings = _core.ring_sums(self.T, self._shares, len(self.V))
         self._rest = _core.rest_matrices(self.V, self.T, self.options.max_aspect)
+        self._minimiser: _core.SolidNewton | None = None  # of the last minimise, with its Hessian
 
     def _newton(self, x: NDArray[np.float64], boundary_motion: int) -> _core.SolidNewton:
         motion = np.full(len(self.V), _FREE, np.uint8)
@@ -226,7 +230,7 @@ class FlipFreeSolver:
         o = self.options
         stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
         face = o.face_weight if glide else 0.0
-        newton = self._newton(x, _GLIDING if glide else _FIXED)
+        newton = self._minimiser = self._newton(x, _GLIDING if glide else _FIXED)
         clock = time.perf_counter()
         weight, kept = start, 0
         for iteration in range(1, total + 1):
@@ -251,26 +255,44 @@ class FlipFreeSolver:
         return x, False, "most iterations done"
 
     def equalise(self, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.float64]:
-        """Make the marginals of the volume exact, see `Marginals`.
+        """Make the volumes between level surfaces of u, v and s those of the source.
 
-        Vertices stay where a tet would lose more than a fifth of its volume: near slivers, which
-        nothing smooth can move.
+        Newton steps at the largest lambda towards the targets of `Marginals`, then its shifts,
+        which leave vertices in place where a tet would lose more than a fifth of its volume: near
+        slivers, which nothing smooth can move. The recorded energy is `Marginals.error`.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
         """
+        o = self.options
         marginals = Marginals(
             self.T, self._shares, self.boundary, Torus(self.R, self.r), held=not glide
         )
-        clock = time.perf_counter()
+        newton = self._minimiser or self._newton(x, _GLIDING if glide else _FIXED)
+        self._minimiser = None
+        weights = _core.EnergyWeights(1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0)
+        clock, total = time.perf_counter(), o.target_iter + o.shift_iter
+        for iteration in range(o.target_iter):
+            newton.set_targets(marginals.targets(x))
+            x, step = newton.step(x, weights, o.cg_tol, o.max_cg, True)
+            self._record(
+                "equalise", iteration + 1, x, marginals.error(x), step.alpha, step.decrement, clock,
+                total,
+            )  # fmt: skip
         least = 0.8 * _core.signed_tet_volumes(x, self.T)
         stay = np.zeros(len(x), bool)
-        for iteration in range(1, _SWEEPS + 1):
-            moved, error = marginals.equalise(x)
+        for iteration in range(o.target_iter, total):
+            moved = marginals.shifted(x)
             moved[stay] = x[stay]
             while (harmed := _core.signed_tet_volumes(moved, self.T) < least).any():
                 stay[self.T[harmed]] = True
                 moved[stay] = x[stay]
             change = float(np.linalg.norm(moved - x, axis=1).max())
-            self._record("equalise", iteration, moved, error, 1.0, change, clock, _SWEEPS)
             x = moved
+            self._record(
+                "equalise", iteration + 1, x, marginals.error(x), 1.0, change, clock, total
+            )
         return x
 
     def make_rings_exact(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool, str]:

@@ -1,33 +1,65 @@
 #include "stretchmap/distortion/level_histogram.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace stretchmap {
+namespace {
+
+// Bins of the four quadrature points of a tet.
+class Bins {
+ public:
+  Bins(const TetsRef& tets, const VecRef& values, Index bins, double period, bool periodic)
+      : tets_(tets), values_(values), bins_(bins), period_(period), periodic_(periodic) {}
+
+  std::array<Index, 4> operator()(Index t) const {
+    const double far = (5.0 - std::sqrt(5.0)) / 20.0, near = 1.0 - 3.0 * far;
+    std::array<double, 4> value;
+    for (int a = 0; a < 4; ++a) {
+      value[a] = values_[tets_(t, a)];
+      if (!periodic_) continue;
+      const double offset = value[a] - value[0];
+      if (offset > 0.5 * period_) value[a] -= period_;
+      if (offset < -0.5 * period_) value[a] += period_;
+    }
+    const double common = far * (value[0] + value[1] + value[2] + value[3]);
+    std::array<Index, 4> bin;
+    for (int a = 0; a < 4; ++a) {
+      double point = (common + (near - far) * value[a]) / period_;
+      if (periodic_) point -= std::floor(point);
+      bin[a] = static_cast<Index>(std::clamp(point * bins_, 0.0, bins_ - 1.0));
+    }
+    return bin;
+  }
+
+ private:
+  const TetsRef& tets_;
+  const VecRef& values_;
+  Index bins_;
+  double period_;
+  bool periodic_;
+};
+
+}  // namespace
 
 Vec level_histogram(const TetsRef& tets, const VecRef& values, const VecRef& amounts, Index bins,
                     double period, bool periodic) {
-  const double far = (5.0 - std::sqrt(5.0)) / 20.0, near = 1.0 - 3.0 * far;
-  const double per_bin = bins / period;
+  const Bins bins_of(tets, values, bins, period, periodic);
   Vec histogram = Vec::Zero(bins);
-  for (Index t = 0; t < tets.rows(); ++t) {
-    double value[4];
-    for (int a = 0; a < 4; ++a) {
-      value[a] = values[tets(t, a)];
-      if (!periodic) continue;
-      const double offset = value[a] - value[0];
-      if (offset > 0.5 * period) value[a] -= period;
-      if (offset < -0.5 * period) value[a] += period;
-    }
-    const double common = far * (value[0] + value[1] + value[2] + value[3]);
-    for (int a = 0; a < 4; ++a) {
-      double point = common + (near - far) * value[a];
-      if (periodic) point -= period * std::floor(point / period);
-      const double place = std::clamp(point * per_bin, 0.0, bins - 1.0);
-      histogram[static_cast<Index>(place)] += 0.25 * amounts[t];
-    }
-  }
+  for (Index t = 0; t < tets.rows(); ++t)
+    for (const Index bin : bins_of(t)) histogram[bin] += 0.25 * amounts[t];
   return histogram;
+}
+
+Vec level_lookup(const TetsRef& tets, const VecRef& values, const VecRef& table, double period,
+                 bool periodic) {
+  const Bins bins_of(tets, values, static_cast<Index>(table.size()), period, periodic);
+  Vec mean = Vec::Zero(tets.rows());
+#pragma omp parallel for schedule(static)
+  for (Index t = 0; t < static_cast<Index>(tets.rows()); ++t)
+    for (const Index bin : bins_of(t)) mean[t] += 0.25 * table[bin];
+  return mean;
 }
 
 }  // namespace stretchmap

@@ -65,6 +65,16 @@ void SolidEnergy::for_batches(const PointsRef& x, const EnergyWeights& w, Index 
   }
 }
 
+void SolidEnergy::set_targets(const VecRef& target) {
+  const Index k = static_cast<Index>(tets_.rows());
+  if (target_.size() == 0) target_.setOnes(k);
+  for (Index t = 0; t < k; ++t) {
+    const double wanted = target[order_[t]];
+    rest_.row(t) *= std::cbrt(target_[t] / wanted);
+    target_[t] = wanted;
+  }
+}
+
 EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
   const Index k = static_cast<Index>(tets_.rows());
   Vec energy(k), det(k);

@@ -34,12 +34,13 @@ void SolidNewton::renew(const PointsRef& x, const EnergyWeights& w, bool keep) {
   const Vec gradient = Eigen::Map<const Vec>(gradient_.data(), gradient_.size());
   if (!keep) {
     changes_.clear();
-  } else {
+  } else if (!new_targets_) {
     const Vec change = gradient - last_gradient_;
     const double curvature = change.dot(last_step_);
     if (curvature > 1e-12 * change.norm() * last_step_.norm())
       changes_.push_back({last_step_, change, 1.0 / curvature});
   }
+  new_targets_ = false;
   last_gradient_ = gradient;
   last_step_.resize(0);
 }

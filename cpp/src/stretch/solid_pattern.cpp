@@ -54,22 +54,23 @@ SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef&
   vertex_row_.setConstant(n, -1);
   for (Index row = 0; row < row_vertex_.size(); ++row) vertex_row_[row_vertex_[row]] = row;
 
-  std::vector<Index> lowest(k), order(k);
+  std::vector<Index> lowest(k);
+  order_.resize(k);
   for (Index t = 0; t < k; ++t) {
     lowest[t] = std::numeric_limits<Index>::max();
     for (int a = 0; a < 4; ++a)
       if (vertex_row_[tets(t, a)] >= 0) lowest[t] = std::min(lowest[t], vertex_row_[tets(t, a)]);
   }
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
+  std::iota(order_.data(), order_.data() + k, 0);
+  std::stable_sort(order_.data(), order_.data() + k,
                    [&](Index a, Index b) { return lowest[a] < lowest[b]; });
   tets_.resize(k, 4);
   rest_.resize(k, 9);
   weights_.resize(k);
   for (Index t = 0; t < k; ++t) {
-    tets_.row(t) = tets.row(order[t]);
-    rest_.row(t) = rest.row(order[t]);
-    weights_[t] = weights[order[t]];
+    tets_.row(t) = tets.row(order_[t]);
+    rest_.row(t) = rest.row(order_[t]);
+    weights_[t] = weights[order_[t]];
   }
   build_pattern();
 }

@@ -39,8 +39,13 @@ class SolidEnergy {
               const FlagsRef& motion, double R, double r, const PointsRef& x,
               BoundaryBarrier barrier = {});
 
+  Index tets() const { return static_cast<Index>(tets_.rows()); }
   Index rows() const { return static_cast<Index>(row_vertex_.size()); }
   BlockMatrix pattern() const;  // of the Hessian, values zero
+
+  // From now on J is multiplied by target^(-1/3): det J = 1 where a tet has `target` times the
+  // volume the rest matrix asks for. target (k) > 0, in the order of the tets given.
+  void set_targets(const VecRef& target);
 
   EnergyReport value(const PointsRef& x, const EnergyWeights& w) const;
 
@@ -74,7 +79,9 @@ class SolidEnergy {
                 Points& gradient, double* blocks) const;
   void into_frames(const PointsRef& x, Index row, Points& gradient, double* blocks) const;
 
-  Tets tets_;  // sorted by lowest row
+  Tets tets_;       // sorted by lowest row
+  IndexVec order_;  // which of the tets given each of them is
+  Vec target_;      // (k) in the sorted order; empty: ones
   Rows rest_;
   Vec weights_;
   Flags motion_;

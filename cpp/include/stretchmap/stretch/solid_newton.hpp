@@ -35,6 +35,12 @@ class SolidNewton {
 
   const SolidEnergy& energy() const { return energy_; }
 
+  // SolidEnergy::set_targets between two steps.
+  void set_targets(const VecRef& target) {
+    energy_.set_targets(target);
+    new_targets_ = true;
+  }
+
   // One inexact Newton step from x (n, 3), which it replaces. The energy never rises, and with
   // epsilon = 0 no tet turns over.
   // \throws SolverError if the energy at x is not finite or the linear solve breaks down.
@@ -58,6 +64,7 @@ class SolidNewton {
   Points gradient_;                // at the current point
   Vec last_gradient_, last_step_;  // before the last step, and the step; empty after a renewal
   std::vector<Change> changes_;    // since the Hessian was renewed
+  bool new_targets_ = false;       // so the change of the gradient is not that of the step alone
 };
 
 }  // namespace stretchmap
