@@ -13,8 +13,8 @@ namespace stretchmap {
 Vec level_histogram(const TetsRef& tets, const VecRef& values, const VecRef& amounts, Index bins,
                     double period, bool periodic);
 
-// (k) mean over each tet of a function of the same values that is constant in every bin, by the same
-// rule. table: (bins).
+// (k) mean over each tet of a function of the same values that is constant in every bin, by the
+// same rule. table: (bins).
 Vec level_lookup(const TetsRef& tets, const VecRef& values, const VecRef& table, double period,
                  bool periodic);
 
