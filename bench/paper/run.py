@@ -36,6 +36,7 @@ def load(names: Iterable[str]) -> dict[str, TetMesh]:
         print(f"no folder {folder}: generated solids instead", file=sys.stderr)
         return {
             "vertebra_like": samples.vertebra_like(20_000),
+            "vertebra_like_1": samples.vertebra_like(15_000, seed=1),
             "bumpy_torus": samples.bumpy_torus(20_000),
         }
     paths = {name: folder / f"{name}.npz" for name in names} or {
@@ -73,7 +74,8 @@ def main(arguments: list[str] | None = None) -> int:
     meshes = load([] if options.all_solids else options.meshes)
     texts, data, failed = [], {}, False
     for key, (title, build) in wanted.items():
-        rows = list(build(meshes))
+        given = load(published.VERTEBRAE) if key == "registration" else meshes
+        rows = list(build(given))
         texts.append(markdown(title, rows))
         print(texts[-1], flush=True)
         data[key] = [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]

@@ -7,12 +7,11 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from . import _core
-from ._flat import FlatSurface
+from ._flat import FlatSurface, damped_solve
 from .errors import LandmarkError, SolverError
 from .progress import Progress, report
 from .results import IterationRecord
@@ -145,19 +144,12 @@ class SurfaceProblem:
         gradient, hessian = _core.match_model(
             self.chart, y, points, slopes, self.rest, self.weights
         )
-        diagonal = hessian.diagonal()
-        floor = 1e-6 * diagonal + 1e-12 * diagonal.mean()
-        hessian = (hessian + sp.diags(floor)).tocsr()
         free = np.flatnonzero(np.repeat(~self.held, 2))
         step = np.zeros(2 * len(y))
         if wish is not None:
             step = wish.ravel().copy()
-        rhs = -(gradient + hessian @ step)[free]
-        inner = hessian[free][:, free].tocsr()
-        inner.sort_indices()
-        solver = _core.SpdSolver(inner, "direct")
-        moved, _ = solver.solve(rhs[:, None], np.zeros((len(free), 1)), must_converge=False)
-        step[free] = moved[:, 0]
+        pull = (gradient + hessian @ step)[free]
+        step[free] = damped_solve(pull, hessian[free][:, free])
         return step.reshape(-1, 2)
 
     def one_by_one(

@@ -70,11 +70,16 @@ def test_the_synthetic_pair_against_the_truth(pair, registered):
     assert result.certificate.certified and result.distortion.flips == 0
     assert result.landmark_error < 1e-12
     assert np.array_equal(result.image[pair.source_landmarks], pair.target.V[pair.target_landmarks])
-    error = np.linalg.norm(result.image[: pair.source.n_vertices] - pair.truth, axis=1)
-    assert error.mean() < 0.02 * size(pair.target)
     free = register(pair.source, pair.target)
-    before = np.linalg.norm(free.image[: pair.source.n_vertices] - pair.truth, axis=1)
-    assert error.mean() < before.mean()
+    skin = pair.source.boundary_vertices
+    error, without = (
+        np.linalg.norm(r.image[: pair.source.n_vertices] - pair.truth, axis=1) / size(pair.target)
+        for r in (result, free)
+    )
+    # The truth does not preserve volume, so inside nothing comes closer than this; on the surface
+    # a target edge is 0.032 long, and landmarks are 0.08 apart.
+    assert error.mean() < 0.012 and error[skin].mean() < 0.007
+    assert error.mean() < without.mean() and error[skin].mean() < 0.7 * without[skin].mean()
     assert result.distortion.ring_sd < 0.12 and result.distortion.total_distortion < 0.07
 
 
