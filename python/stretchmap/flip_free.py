@@ -51,7 +51,9 @@ class FlipFreeOptions:
     untangle_iter, frozen_iter, glide_iter : int
         Most steps of each stage.
     target_iter, shift_iter : int
-        Steps of each kind that equalise the volumes along u, v and s.
+        Most steps of each kind that equalise the volumes along u, v and s.
+    marginal_tol : float
+        No more of the first kind when no level is off by more than this share of the volume.
     floor : float
         Least determinant untangling aims for: a start closer to folding than that makes the barrier
         too steep for rounded arithmetic.
@@ -76,6 +78,7 @@ class FlipFreeOptions:
     glide_iter: int = 60
     target_iter: int = 8
     shift_iter: int = 4
+    marginal_tol: float = 1e-4
     floor: float = 1e-3
     glide_tol: float = 2e-3
     frozen_tol: float = 5e-4
@@ -274,6 +277,8 @@ class FlipFreeSolver:
         weights = _core.EnergyWeights(1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0)
         clock, total = time.perf_counter(), o.target_iter + o.shift_iter
         for iteration in range(o.target_iter):
+            if marginals.error(x) < o.marginal_tol:
+                break
             newton.set_targets(marginals.targets(x))
             x, step = newton.step(x, weights, o.cg_tol, o.max_cg, True)
             self._record(
@@ -282,7 +287,7 @@ class FlipFreeSolver:
             )  # fmt: skip
         least = 0.8 * _core.signed_tet_volumes(x, self.T)
         stay = np.zeros(len(x), bool)
-        for iteration in range(o.target_iter, total):
+        for iteration in range(total - o.shift_iter, total):
             moved = marginals.shifted(x)
             moved[stay] = x[stay]
             while (harmed := _core.signed_tet_volumes(moved, self.T) < least).any():
