@@ -124,7 +124,7 @@ RelaxReport relax_grid(const GridCorners& corners, const GridEnergy& energy,
   RelaxReport report;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (Index i = 0; i < n; ++i) {
-      if (poll && i % 256 == 0) poll();
+      if (poll && i % 32 == 0) poll();
       double gain = 0.0;
       if (place[i] < 0) {
         gain = search.improve_inside(i, lengths[i]);

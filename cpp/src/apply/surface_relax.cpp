@@ -107,7 +107,7 @@ RelaxReport relax_match(const SurfaceChart& chart, const SurfaceWalk& target, co
   RelaxReport report;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (Index i = 0; i < chart.n_vertices; ++i) {
-      if (poll && i % 1024 == 0) poll();
+      if (poll && i % 64 == 0) poll();
       if (held[i]) continue;
       const double gain = search.improve(i, lengths[i]);
       lengths.update(i, gain > 0.0);
