@@ -51,34 +51,37 @@ Index ChartLocator::wrap(double coordinate) const {
   return std::min(static_cast<Index>(fraction * size_), size_ - 1);
 }
 
+ChartLocator::Hit ChartLocator::find(const Eigen::Vector2d& q) const {
+  const std::size_t c = static_cast<std::size_t>(wrap(q.x())) +
+                        static_cast<std::size_t>(size_) * static_cast<std::size_t>(wrap(q.y()));
+  Hit best;
+  double least = -kSlack;
+  for (Index e = start_[c]; e < start_[c + 1]; ++e) {
+    const Index f = face_[static_cast<std::size_t>(e)];
+    Eigen::Matrix<double, 2, 3> x;
+    for (int k = 0; k < 3; ++k) x.col(k) = chart_.corner(turns_, f, k);
+    const Eigen::Vector2d centre = x.rowwise().mean();
+    const Eigen::Vector2d p = q + (centre - q).array().round().matrix();
+    x.colwise() -= p;
+    const Eigen::Vector3d w(cross(x.col(1), x.col(2)), cross(x.col(2), x.col(0)),
+                            cross(x.col(0), x.col(1)));
+    const double area = w.sum();
+    if (!(area > 0.0) || !(w.minCoeff() / area > least)) continue;
+    best.face = f;
+    best.weights = w / area;
+    least = best.weights.minCoeff();
+  }
+  return best;
+}
+
 FaceLocation ChartLocator::locate(const Points2Ref& queries) const {
   const Index n = static_cast<Index>(queries.rows());
   FaceLocation found{IndexVec(n), Points(n, 3)};
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (n > 1000)
   for (Index i = 0; i < n; ++i) {
-    const Eigen::Vector2d q = queries.row(i).transpose();
-    const std::size_t c = static_cast<std::size_t>(wrap(q.x())) +
-                          static_cast<std::size_t>(size_) * static_cast<std::size_t>(wrap(q.y()));
-    Index best = -1;
-    double least = -kSlack;
-    Eigen::Vector3d weights = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-    for (Index e = start_[c]; e < start_[c + 1]; ++e) {
-      const Index f = face_[static_cast<std::size_t>(e)];
-      Eigen::Matrix<double, 2, 3> x;
-      for (int k = 0; k < 3; ++k) x.col(k) = chart_.corner(turns_, f, k);
-      const Eigen::Vector2d centre = x.rowwise().mean();
-      const Eigen::Vector2d p = q + (centre - q).array().round().matrix();
-      x.colwise() -= p;
-      const Eigen::Vector3d w(cross(x.col(1), x.col(2)), cross(x.col(2), x.col(0)),
-                              cross(x.col(0), x.col(1)));
-      const double area = w.sum();
-      if (!(area > 0.0) || !(w.minCoeff() / area > least)) continue;
-      best = f;
-      weights = w / area;
-      least = weights.minCoeff();
-    }
-    found.face[i] = best;
-    found.weights.row(i) = weights.transpose();
+    const Hit hit = find(queries.row(i).transpose());
+    found.face[i] = hit.face;
+    found.weights.row(i) = hit.weights.transpose();
   }
   return found;
 }

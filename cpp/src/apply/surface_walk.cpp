@@ -3,17 +3,17 @@
 namespace stretchmap {
 
 bool SurfaceWalk::point(const Eigen::RowVector2d& y, Eigen::RowVector3d& x) const {
-  const FaceLocation found = locator.locate(Points2(y));
-  if (found.face[0] < 0) return false;
+  const ChartLocator::Hit hit = locator.find(y.transpose());
+  if (hit.face < 0) return false;
   x.setZero();
-  for (int k = 0; k < 3; ++k) x += found.weights(0, k) * points.row(faces(found.face[0], k));
+  for (int k = 0; k < 3; ++k) x += hit.weights[k] * points.row(faces(hit.face, k));
   return true;
 }
 
 Eigen::Matrix2d SurfaceWalk::steps(const Eigen::RowVector2d& y) const {
-  const FaceLocation found = locator.locate(Points2(y));
-  if (found.face[0] < 0) return Eigen::Matrix2d::Zero();
-  const auto row = slopes.row(found.face[0]);
+  const ChartLocator::Hit hit = locator.find(y.transpose());
+  if (hit.face < 0) return Eigen::Matrix2d::Zero();
+  const auto row = slopes.row(hit.face);
   Eigen::Matrix<double, 3, 2> J;
   J << row[0], row[1], row[2], row[3], row[4], row[5];
   const Eigen::Matrix2d metric = J.transpose() * J;

@@ -2,6 +2,7 @@
 // coordinates.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "stretchmap/base/types.hpp"
@@ -16,12 +17,20 @@ struct FaceLocation {
 
 class ChartLocator {
  public:
+  struct Hit {
+    Index face = -1;
+    Eigen::Vector3d weights = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  };
+
   // turns (n, 2): chart coordinates of the vertices. \pre every face is smaller than half a turn.
   // Faces without positive area are never answered.
   ChartLocator(SurfaceChart chart, const Points2Ref& turns);
 
   // queries (n, 2) in turns, any branch.
   FaceLocation locate(const Points2Ref& queries) const;
+
+  // The same for one point, without threads.
+  Hit find(const Eigen::Vector2d& query) const;
 
  private:
   Index wrap(double coordinate) const;
