@@ -15,6 +15,8 @@ few tenths of a per cent. Two means against that:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
@@ -26,6 +28,26 @@ __all__ = ["Marginals"]
 
 _BINS = (8, 64)
 _TARGETS = (0.8, 1.25)  # what more is missing is beyond a correction
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """Volume along one coordinate.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n,)
+        The coordinate of every vertex.
+    period : float
+        Its largest value; 2 pi for an angle.
+    source, image : ndarray, shape (bins,)
+        Volume in bins of equal width, each summing to 1.
+    """
+
+    values: NDArray[np.float64]
+    period: float
+    source: NDArray[np.float64]
+    image: NDArray[np.float64]
 
 
 class Marginals:
@@ -58,43 +80,39 @@ class Marginals:
         bins = int(np.clip(round(len(T) ** (1.0 / 3.0)), *_BINS))
         self.multipliers = np.zeros((3, bins))
 
-    def coordinates(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """``(s / r)^2``, ``u`` and ``v`` of every vertex; the first is the share of the volume."""
+    def measure(self, x: NDArray[np.float64]) -> list[Marginal]:
+        """Of an image (n, 3): the marginals of ``(s / r)^2``, ``u`` and ``v``.
+
+        The first is the share of the volume that lies further inside.
+        """
+        amounts = self._amounts(x)
+        periods = (1.0, TWO_PI, TWO_PI)
+        return [
+            Marginal(values, period, *self._histograms(amounts, values, period))
+            for values, period in zip(self._coordinates(x), periods, strict=True)
+        ]
+
+    def _coordinates(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         u, v, s = self.torus.coordinates(x)
         level = (s / self.torus.r) ** 2
         level[self.boundary] = 1.0
         return level, u, v
 
-    def error(self, x: NDArray[np.float64]) -> float:
+    def error(self, marginals: list[Marginal]) -> float:
         """Largest difference between image and source volume below any level.
 
         As a share of the whole; for angles up to a constant, since any level may be the first.
         """
-        return max(
-            float(np.abs(below).max())
-            for values, period in zip(self.coordinates(x), (1.0, TWO_PI, TWO_PI), strict=True)
-            for below in [self._below(*self._histograms(x, values, period), period)]
-        )
+        return max(float(np.abs(self._below(m.source, m.image, m.period)).max()) for m in marginals)
 
-    def targets(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Update the multipliers; the volume to ask of each tet, relative to its share.
-
-        Parameters
-        ----------
-        x : ndarray, shape (n, 3)
-            Image.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-        """
+    def targets(self, marginals: list[Marginal]) -> NDArray[np.float64]:
+        """Update the multipliers; the volume (k,) to ask of each tet, relative to its share."""
         targets = np.ones(len(self.T))
-        for values, period, table in zip(
-            self.coordinates(x), (1.0, TWO_PI, TWO_PI), self.multipliers, strict=True
-        ):
-            source, image = self._histograms(x, values, period)
-            table += np.divide(source - image, source, where=source > 0.0, out=np.zeros_like(table))
-            targets += _core.level_lookup(self.T, values, table, period, period == TWO_PI)
+        for m, table in zip(marginals, self.multipliers, strict=True):
+            table += np.divide(
+                m.source - m.image, m.source, where=m.source > 0.0, out=np.zeros_like(table)
+            )
+            targets += _core.level_lookup(self.T, m.values, table, m.period, m.period == TWO_PI)
         return np.clip(targets, *_TARGETS)
 
     def shifted(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -114,7 +132,7 @@ class Marginals:
             The torus is mapped to itself.
         """
         for axis in range(1 if self.held else 3):
-            level, u, v = self.coordinates(x)
+            level, u, v = self._coordinates(x)
             if axis == 0:
                 # A chord of the torus can leave it, and a vertex near the chord with it.
                 shift = self._missing(x, level, 1.0)(level)
@@ -131,18 +149,18 @@ class Marginals:
             x = moved
         return x
 
-    def _histograms(
-        self, x: NDArray[np.float64], values: NDArray[np.float64], period: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Source and image volume in the bins of one coordinate, each summing to 1."""
+    def _amounts(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Shares of source and image volume (k, 2)."""
         volumes = _core.signed_tet_volumes(x, self.T)
-        volumes /= volumes.sum()
+        return np.column_stack([self.shares, volumes / volumes.sum()])
+
+    def _histograms(
+        self, amounts: NDArray[np.float64], values: NDArray[np.float64], period: float
+    ) -> NDArray[np.float64]:
+        """Source and image volume in the bins of one coordinate, each summing to 1: (2, bins)."""
         bins = self.multipliers.shape[1]
-        source, image = (
-            _core.level_histogram(self.T, values, amounts, bins, period, period == TWO_PI)
-            for amounts in (self.shares, volumes)
-        )
-        return source, image
+        found = _core.level_histogram(self.T, values, amounts, bins, period, period == TWO_PI)
+        return np.ascontiguousarray(found.T)
 
     @staticmethod
     def _below(
@@ -158,7 +176,7 @@ class Marginals:
         self, x: NDArray[np.float64], values: NDArray[np.float64], period: float
     ) -> PchipInterpolator:
         """`_below` as a function of the level."""
-        below = self._below(*self._histograms(x, values, period), period)
+        below = self._below(*self._histograms(self._amounts(x), values, period), period)
         step = period / (len(below) - 1)
         if period != TWO_PI:
             return PchipInterpolator(np.arange(len(below)) * step, below)

@@ -276,14 +276,16 @@ class FlipFreeSolver:
         self._minimiser = None
         weights = _core.EnergyWeights(1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0)
         clock, total = time.perf_counter(), o.target_iter + o.shift_iter
+        measured = marginals.measure(x)
         for iteration in range(o.target_iter):
-            if marginals.error(x) < o.marginal_tol:
+            if marginals.error(measured) < o.marginal_tol:
                 break
-            newton.set_targets(marginals.targets(x))
+            newton.set_targets(marginals.targets(measured))
             x, step = newton.step(x, weights, o.cg_tol, o.max_cg, True)
+            measured = marginals.measure(x)
             self._record(
-                "equalise", iteration + 1, x, marginals.error(x), step.alpha, step.decrement, clock,
-                total,
+                "equalise", iteration + 1, x, marginals.error(measured), step.alpha, step.decrement,
+                clock, total,
             )  # fmt: skip
         least = 0.8 * _core.signed_tet_volumes(x, self.T)
         stay = np.zeros(len(x), bool)
@@ -296,8 +298,9 @@ class FlipFreeSolver:
             change = float(np.linalg.norm(moved - x, axis=1).max())
             x = moved
             self._record(
-                "equalise", iteration + 1, x, marginals.error(x), 1.0, change, clock, total
-            )
+                "equalise", iteration + 1, x, marginals.error(marginals.measure(x)), 1.0, change,
+                clock, total,
+            )  # fmt: skip
         return x
 
     def make_rings_exact(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool, str]:

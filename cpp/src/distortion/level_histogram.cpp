@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 namespace stretchmap {
 namespace {
+
+constexpr Index kRun = 8192;  // tets added up by one thread, whatever the number of threads
 
 // Bins of the four quadrature points of a tet.
 class Bins {
@@ -43,12 +46,20 @@ class Bins {
 
 }  // namespace
 
-Vec level_histogram(const TetsRef& tets, const VecRef& values, const VecRef& amounts, Index bins,
-                    double period, bool periodic) {
+Rows level_histogram(const TetsRef& tets, const VecRef& values, const RowsRef& amounts, Index bins,
+                     double period, bool periodic) {
   const Bins bins_of(tets, values, bins, period, periodic);
-  Vec histogram = Vec::Zero(bins);
-  for (Index t = 0; t < tets.rows(); ++t)
-    for (const Index bin : bins_of(t)) histogram[bin] += 0.25 * amounts[t];
+  const Index k = static_cast<Index>(tets.rows()), runs = (k + kRun - 1) / kRun;
+  std::vector<Rows> partial(runs);
+#pragma omp parallel for schedule(static)
+  for (Index run = 0; run < runs; ++run) {
+    Rows& sums = partial[run];
+    sums.setZero(bins, amounts.cols());
+    for (Index t = kRun * run; t < std::min(k, kRun * (run + 1)); ++t)
+      for (const Index bin : bins_of(t)) sums.row(bin) += 0.25 * amounts.row(t);
+  }
+  Rows histogram = Rows::Zero(bins, amounts.cols());
+  for (const Rows& sums : partial) histogram += sums;
   return histogram;
 }
 

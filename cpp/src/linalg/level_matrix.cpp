@@ -13,6 +13,66 @@ using RowBlock = Eigen::Matrix<T, B, B, B == 1 ? Eigen::ColMajor : Eigen::RowMaj
 template <class T, int B>
 using ColBlock = Eigen::Matrix<T, B, B>;
 
+// A block row times x, pairs of numbers at a time, in several sums so that no addition waits for
+// the one before. Blocks are row-major.
+template <int B>
+class BlockRowSum {
+  static_assert(B % 2 == 0);
+  using Pair = Lanes<double, 2>;
+
+ public:
+  BlockRowSum() {
+    for (Pair& sum : row_) sum.setZero();
+  }
+  void add(const double* block, const double* x) {
+    for (int c = 0; c < B; c += 2)
+      for (int r = 0; r < B; ++r) row_[r] += lanes<2>(block + B * r + c) * lanes<2>(x + c);
+  }
+  void store(double* y) const {
+    for (int r = 0; r < B; ++r) y[r] = row_[r].sum();
+  }
+
+ private:
+  Pair row_[B];
+};
+
+template <>
+class BlockRowSum<1> {
+ public:
+  void add(const double* block, const double* x) { sum_ += block[0] * x[0]; }
+  void store(double* y) const { y[0] = sum_; }
+
+ private:
+  double sum_ = 0.0;
+};
+
+// Pairs of the nine numbers in a row, whether they belong to one row or two.
+template <>
+class BlockRowSum<3> {
+  using Pair = Lanes<double, 2>;
+
+ public:
+  BlockRowSum() {
+    for (Pair& sum : pair_) sum.setZero();
+  }
+  void add(const double* block, const double* x) {
+    pair_[0] += lanes<2>(block) * lanes<2>(x);
+    pair_[1] += lanes<2>(block + 2) * Pair(x[2], x[0]);
+    pair_[2] += lanes<2>(block + 4) * lanes<2>(x + 1);
+    pair_[3] += lanes<2>(block + 6) * lanes<2>(x);
+    last_ += block[8] * x[2];
+  }
+  void store(double* y) const {
+    y[0] = pair_[0].sum() + pair_[1][0];
+    y[1] = pair_[1][1] + pair_[2].sum();
+    y[2] = pair_[3].sum() + last_;
+  }
+
+ private:
+  Pair pair_[4];
+  double last_ = 0.0;
+};
+
 }  // namespace
 
 template <int B>
@@ -148,7 +208,7 @@ template <int B>
 template <int K>
 std::array<double, K> LevelMatrix<B>::multiply(const double* x, double* y) const {
   static_assert(B == 1 || K == 1);
-  constexpr size_t kBlock = B * B, kRow = B * K;
+  constexpr size_t kBlock = B * B;
   return sum_chunks<K>(n, [&](Index begin, Index end, std::array<double, K>& dots) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
       if constexpr (K > 1) {
@@ -160,20 +220,12 @@ std::array<double, K> LevelMatrix<B>::multiply(const double* x, double* y) const
         for (int k = 0; k < K; ++k) dots[k] += total[k];
         continue;
       }
-      double sum[kRow] = {};
-      const auto add = [&](const double* block, const double* xe) {
-        for (int r = 0; r < B; ++r)
-          for (int c = 0; c < B; ++c)
-            for (int k = 0; k < K; ++k) sum[K * r + k] += block[B * r + c] * xe[K * c + k];
-      };
-      add(diagonal.data() + kBlock * i, x + kRow * i);
+      BlockRowSum<B> sum;
+      sum.add(diagonal.data() + kBlock * i, x + B * i);
       for (size_t e = start[i]; e < static_cast<size_t>(start[i + 1]); ++e)
-        add(value.data() + kBlock * e, x + kRow * col[e]);
-      for (int r = 0; r < B; ++r)
-        for (int k = 0; k < K; ++k) {
-          y[kRow * i + K * r + k] = sum[K * r + k];
-          dots[k] += x[kRow * i + K * r + k] * sum[K * r + k];
-        }
+        sum.add(value.data() + kBlock * e, x + B * static_cast<size_t>(col[e]));
+      sum.store(y + B * i);
+      for (int r = 0; r < B; ++r) dots[0] += x[B * i + r] * y[B * i + r];
     }
   });
 }

@@ -9,40 +9,48 @@ namespace {
 using std::size_t;
 
 // The numbers of one row, held in whole vector registers: either one block row (K = 1, lanes are
-// its B unknowns and padding) or K right-hand sides of one unknown (B = 1).
+// its B unknowns and padding) or K right-hand sides of one unknown (B = 1). Each column of a block
+// has a sum of its own, so that no addition waits for the one before.
 template <int B, int K>
-struct RowSum {
+class RowSum {
   static_assert(B == 1 || K == 1);
   static constexpr int kUsed = B * K;
   static constexpr int kLanes = kUsed <= 2 ? kUsed : (kUsed + 3) / 4 * 4;
   using Lanes = Eigen::Array<float, kLanes, 1>;
-  Lanes sum;
 
-  static Eigen::Map<const Lanes> lanes(const float* from) { return Eigen::Map<const Lanes>(from); }
-  void load(const float* from) {
-    sum.setZero();
-    for (int k = 0; k < kUsed; ++k) sum[k] = from[k];
+ public:
+  RowSum() {
+    for (Lanes& sum : part_) sum.setZero();
   }
-  void store(float* to) const {
-    for (int k = 0; k < kUsed; ++k) to[k] = sum[k];
+  explicit RowSum(const float* from) : RowSum() {
+    for (int k = 0; k < kUsed; ++k) part_[0][k] = from[k];
   }
-  // sum -= block * x; reads up to kPadding numbers beyond a column-major block.
+  // this -= block * x; reads up to kPadding numbers beyond a column-major block.
   void subtract(const float* block, const float* x) {
     if constexpr (B == 1)
-      sum -= block[0] * lanes(x);
+      part_[0] -= block[0] * lanes(x);
     else
-      for (int c = 0; c < B; ++c) sum -= x[c] * lanes(block + B * c);
+      for (int c = 0; c < B; ++c) part_[c] -= x[c] * lanes(block + B * c);
   }
-  // sum = block * sum
-  void transform(const float* block) {
-    if constexpr (B == 1) {
-      sum *= block[0];
-    } else {
-      const Lanes in = sum;
-      sum = in[0] * lanes(block);
-      for (int c = 1; c < B; ++c) sum += in[c] * lanes(block + B * c);
-    }
+  Lanes total() const {
+    Lanes sum = part_[0];
+    for (int c = 1; c < B; ++c) sum += part_[c];
+    return sum;
   }
+  // block * sum
+  static Lanes transform(const float* block, const Lanes& sum) {
+    if constexpr (B == 1) return block[0] * sum;
+    Lanes out = sum[0] * lanes(block);
+    for (int c = 1; c < B; ++c) out += sum[c] * lanes(block + B * c);
+    return out;
+  }
+  static void store(const Lanes& sum, float* to) {
+    for (int k = 0; k < kUsed; ++k) to[k] = sum[k];
+  }
+
+ private:
+  static Eigen::Map<const Lanes> lanes(const float* from) { return Eigen::Map<const Lanes>(from); }
+  Lanes part_[B];
 };
 
 }  // namespace
@@ -53,10 +61,8 @@ void LevelMatrix<B>::divide_by_diagonal(const float* r, float* z) const {
   constexpr size_t kBlock = B * B, kRow = B * K;
   for_chunks(n, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
-      RowSum<B, K> row;
-      row.load(r + kRow * i);
-      row.transform(inverse_f.data() + kBlock * i);
-      row.store(z + kRow * i);
+      const RowSum<B, K> row(r + kRow * i);
+      row.store(row.transform(inverse_f.data() + kBlock * i, row.total()), z + kRow * i);
     }
   });
 }
@@ -72,11 +78,9 @@ void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
       n,
       [&](Index begin, Index end) {
         for (Index i = begin; i < end; ++i) {
-          RowSum<B, K> row;
-          row.load(b + kRow * i);
+          RowSum<B, K> row(b + kRow * i);
           subtract(lower[i], upper[i], row);
-          row.transform(inverse_f.data() + kBlock * i);
-          row.store(x + kRow * i);
+          row.store(row.transform(inverse_f.data() + kBlock * i, row.total()), x + kRow * i);
         }
       },
       chunk);
@@ -84,15 +88,15 @@ void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       RowSum<B, K> row;
-      row.sum.setZero();
-      if (excess[i] > 0.0f) {
-        row.load(b + kRow * i);
-        subtract(lower[i], upper[i], row);
-        row.sum *= excess[i];
-      }
       subtract(start[i], lower[i], row);
       subtract(upper[i], start[i + 1], row);
-      row.store(r + kRow * i);
+      auto total = row.total();
+      if (excess[i] > 0.0f) {
+        RowSum<B, K> enlarged(b + kRow * i);
+        subtract(lower[i], upper[i], enlarged);
+        total += excess[i] * enlarged.total();
+      }
+      row.store(total, r + kRow * i);
     }
   });
 }
@@ -105,16 +109,15 @@ void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) co
       n,
       [&](Index begin, Index end) {
         for (Index i = end - 1; i >= begin; --i) {
-          RowSum<B, K> row, old;
-          row.load(b + kRow * i);
-          old.load(y + kRow * i);
+          RowSum<B, K> row(b + kRow * i);
           for (Index e = start[i]; e < upper[i]; ++e)
             row.subtract(value_f.data() + kBlock * e, y + kRow * col[e]);
-          for (Index e = upper[i]; e < start[i + 1]; ++e)
+          // The nearest rows, whose results were written last, at the end.
+          for (Index e = start[i + 1] - 1; e >= upper[i]; --e)
             row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
-          row.transform(inverse_f.data() + kBlock * i);
-          row.sum += excess[i] * old.sum;
-          row.store(x + kRow * i);
+          auto moved = row.transform(inverse_f.data() + kBlock * i, row.total());
+          moved += excess[i] * RowSum<B, K>(y + kRow * i).total();
+          row.store(moved, x + kRow * i);
         }
       },
       chunk);
@@ -125,14 +128,11 @@ void LevelMatrix<B>::scaled_multiply(const float* x, float* y) const {
   constexpr size_t kBlock = B * B, kRow = B;
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      RowSum<B, 1> row, self;
-      row.sum.setZero();
+      RowSum<B, 1> row;
       for (Index e = start[i]; e < start[i + 1]; ++e)
         row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
-      row.transform(inverse_f.data() + kBlock * i);
-      self.load(x + kRow * i);
-      row.sum = self.sum - row.sum / (1.0f - excess[i]);
-      row.store(y + kRow * i);
+      const auto scaled = row.transform(inverse_f.data() + kBlock * i, row.total());
+      row.store(RowSum<B, 1>(x + kRow * i).total() - scaled / (1.0f - excess[i]), y + kRow * i);
     }
   });
 }

@@ -171,17 +171,19 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
 }
 
 template <int B, int K>
-std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const {
+std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) {
   constexpr size_t kSize = static_cast<size_t>(B) * K, kCoarse = static_cast<size_t>(K) * K;
   const auto make_slots = [&] { return std::vector<Index>(aggregates.count); };
-  std::vector<double> product(kSize * ap.col.size(), 0.0);
+  product_.resize(kSize * ap.col.size());
   for_chunks_with(A.n, make_slots, [&](Index begin, Index end, std::vector<Index>& slot) {
     for (Index i = begin; i < end; ++i) {
       for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e) slot[ap.col[e]] = e;
+      std::fill(product_.begin() + kSize * ap.start[i], product_.begin() + kSize * ap.start[i + 1],
+                0.0);
       const auto add = [&](const double* a, Index j) {
         for (Index e = p.start[j]; e < p.start[j + 1]; ++e) {
           const float* from = p_value.data() + kSize * e;
-          double* to = product.data() + kSize * slot[p.col[e]];
+          double* to = product_.data() + kSize * slot[p.col[e]];
           for (int b = 0; b < B; ++b)
             for (int c = 0; c < B; ++c)
               for (int k = 0; k < K; ++k) to[K * b + k] += a[B * b + c] * from[K * c + k];
@@ -202,7 +204,7 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const
             const Index i = r.col[e];
             const float* left = r_value.data() + kSize * e;
             for (Index f = ap.start[i]; f < ap.start[i + 1]; ++f) {
-              const double* right = product.data() + kSize * f;
+              const double* right = product_.data() + kSize * f;
               double* to = values.data() + kCoarse * slot[ap.col[f]];
               for (int b = 0; b < B; ++b)
                 for (int k = 0; k < K; ++k)

@@ -33,7 +33,7 @@ BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, Index f) const
   State s;
   for (int k = 0; k < 3; ++k) {
     s.x[k] = x.row(faces_(f, k)).transpose();
-    s.rho[k] = std::hypot(s.x[k][0], s.x[k][1]);
+    s.rho[k] = s.x[k].head<2>().norm();
     const double cu = s.x[k][0] / s.rho[k], su = s.x[k][1] / s.rho[k];
     const double cv = (s.rho[k] - R_) / r_, sv = s.x[k][2] / r_;
     s.cos_v[k] = cv;
@@ -48,7 +48,7 @@ BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, Index f) const
   s.inverse_area = 2.0 * (rest_(f, 0) * rest_(f, 3) - rest_(f, 1) * rest_(f, 2));
   s.area = 0.5 * s.inverse_area * (s.x[1] - s.x[0]).cross(s.x[2] - s.x[0]);
   const Vector3d centroid = (s.x[0] + s.x[1] + s.x[2]) / 3.0;
-  const double rho = std::hypot(centroid[0], centroid[1]);
+  const double rho = centroid.head<2>().norm();
   const Vector3d along(-centroid[1] / rho, centroid[0] / rho, 0.0);  // e_u at the centroid
   const Vector3d off = centroid - R_ / rho * Vector3d(centroid[0], centroid[1], 0.0);
   s.normal[3] = off.normalized();

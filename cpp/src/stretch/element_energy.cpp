@@ -1,6 +1,8 @@
 #include "stretchmap/stretch/element_energy.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "lane_svd.hpp"
@@ -42,6 +44,23 @@ STRETCHMAP_INLINE void jacobians(const ElementBatch& batch, Jacobians& out) {
   }
 }
 
+// Of positive numbers, to rounding; finite or NaN for others. A third of the exponent and Halley's
+// iteration three times, from an error of 5 % to 2e-5, 4e-15 and none.
+STRETCHMAP_INLINE void cube_roots(const Lane& of, Lane& root) {
+  alignas(64) std::uint64_t bits[kLanes];
+  std::memcpy(bits, of, sizeof(bits));
+  for (int l = 0; l < kLanes; ++l) {
+    const std::uint64_t third = ((bits[l] >> 32) * 0xAAAAAAABu) >> 33;
+    bits[l] = (third + 715094163u) << 32;
+  }
+  std::memcpy(root, bits, sizeof(bits));
+  for (int pass = 0; pass < 3; ++pass)
+    for (int l = 0; l < kLanes; ++l) {
+      const double cube = root[l] * root[l] * root[l];
+      root[l] *= (cube + 2.0 * of[l]) / (2.0 * cube + of[l]);
+    }
+}
+
 // psi as a function of I = tr(J^T J) and D = det J: psi = a(D) I + b(D).
 struct Terms {
   alignas(64) Lane a, a1, a2;  // a and its derivatives in D
@@ -56,7 +75,7 @@ STRETCHMAP_INLINE void terms(const Lane& det, const EnergyWeights& w, Terms& t) 
     chi1[l] = r.first;
     chi2[l] = r.second;
   }
-  for (int l = 0; l < kLanes; ++l) root[l] = std::cbrt(chi[l]);
+  cube_roots(chi, root);
   const double c = w.shape / 3.0, m = 0.5 * w.volume;
   for (int l = 0; l < kLanes; ++l) {
     const double q = 1.0 / chi[l], N = det[l] * det[l] + 1.0;

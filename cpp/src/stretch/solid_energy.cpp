@@ -199,7 +199,7 @@ void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, 
 // Axes of a vertex: Cartesian, or along the torus' coordinate circles and its normal.
 Matrix3d SolidEnergy::frame(const PointsRef& x, Index vertex) const {
   if (motion_[vertex] != kGliding) return Matrix3d::Identity();
-  const double rho = std::hypot(x(vertex, 0), x(vertex, 1));
+  const double rho = x.row(vertex).head<2>().norm();
   const double cu = x(vertex, 0) / rho, su = x(vertex, 1) / rho;
   const double v = std::atan2(x(vertex, 2), rho - R_);
   const double cv = std::cos(v), sv = std::sin(v);
@@ -226,7 +226,7 @@ void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
     if (gliding) turned.row(2).setZero();
     if (motion_[other] == kGliding) turned.col(2).setZero();
     if (gliding && other == vertex) {
-      const double rho = std::hypot(x(vertex, 0), x(vertex, 1));
+      const double rho = x.row(vertex).head<2>().norm();
       const double cv = (rho - R_) / r_, sv = x(vertex, 2) / r_;
       // Second derivatives of xi along arc length: uu is -radial / rho, vv is -normal / r,
       // uv is -sin(v) e_u / rho, radial being cos(v) normal - sin(v) e_v.
@@ -257,7 +257,7 @@ Points SolidEnergy::move(const PointsRef& x, const PointsRef& step, double alpha
       moved.row(i) += alpha * step.row(row);
       continue;
     }
-    const double rho = std::hypot(x(i, 0), x(i, 1));
+    const double rho = x.row(i).head<2>().norm();
     const double u = std::atan2(x(i, 1), x(i, 0)) + alpha * step(row, 0) / rho;
     const double v = std::atan2(x(i, 2), rho - R_) + alpha * step(row, 1) / r_;
     const double radius = R_ + r_ * std::cos(v);

@@ -1,17 +1,17 @@
-// How an amount carried by the tets is spread over the values of a function of the vertices.
+// How amounts carried by the tets is spread over the values of a function of the vertices.
 #pragma once
 
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap {
 
-// (bins) amounts in the bins of [0, period]. Every tet counts as the four points of the quadrature
-// rule of degree two, each with a quarter of its amount; the function is linear on a tet.
-// values (n): values beyond the ends count in the first or last bin. periodic: values are angles,
-// say, that agree modulo the period; a tet spans less than half of it.
-// \pre tets index into [0, n), amounts of length k, bins > 0, period > 0.
-Vec level_histogram(const TetsRef& tets, const VecRef& values, const VecRef& amounts, Index bins,
-                    double period, bool periodic);
+// (bins, c) amounts in the bins of [0, period]. Every tet counts as the four points of the
+// quadrature rule of degree two, each with a quarter of its amounts; the function is linear on a
+// tet. values (n): values beyond the ends count in the first or last bin. periodic: values are
+// angles, say, that agree modulo the period; a tet spans less than half of it. \pre tets index into
+// [0, n), amounts (k, c), bins > 0, period > 0.
+Rows level_histogram(const TetsRef& tets, const VecRef& values, const RowsRef& amounts, Index bins,
+                     double period, bool periodic);
 
 // (k) mean over each tet of a function of the same values that is constant in every bin, by the
 // same rule. table: (bins).
