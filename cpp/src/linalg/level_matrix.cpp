@@ -122,6 +122,28 @@ void LevelMatrix<B>::set_pattern(Index rows, const Index* row_start, const Index
         }
       },
       chunk);
+  set_sweep_pattern();
+}
+
+template <int B>
+void LevelMatrix<B>::set_sweep_pattern() {
+  later.resize(n);
+  for (SweepEntries* entries : {&earlier, &rest})
+    entries->start.assign(static_cast<size_t>(n) + 1, 0);
+  for (Index i = 0; i < n; ++i) {
+    earlier.start[i + 1] = earlier.start[i] + upper[i] - lower[i];
+    later[i] = rest.start[i] + lower[i] - start[i];
+    rest.start[i + 1] = later[i] + start[i + 1] - upper[i];
+  }
+  for (SweepEntries* entries : {&earlier, &rest}) {
+    const auto count = static_cast<size_t>(entries->start[n]);
+    entries->col.resize(count);
+    entries->value.resize(static_cast<size_t>(B * B) * count + kPadding);
+  }
+  for_chunks(n, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      for_sweep_entries(i, [&](SweepEntries& to, Index at, Index e) { to.col[at] = col[e]; });
+  });
 }
 
 template <int B>
@@ -144,12 +166,13 @@ template <int B>
 std::vector<Index> LevelMatrix<B>::set_values(const double* values, double scale) {
   constexpr size_t kSize = B * B;
   set_product_values(values, scale);
-  value_f.resize(kSize * col.size() + kPadding);
   for_chunks(n, [&](Index begin, Index end) {
-    for (size_t e = start[begin]; e < static_cast<size_t>(start[end]); ++e)
-      for (int r = 0; r < B; ++r)
-        for (int c = 0; c < B; ++c)
-          value_f[kSize * e + B * c + r] = static_cast<float>(value[kSize * e + B * r + c]);
+    for (Index i = begin; i < end; ++i)
+      for_sweep_entries(i, [&](SweepEntries& to, Index at, Index e) {
+        for (int r = 0; r < B; ++r)
+          for (int c = 0; c < B; ++c)
+            to.value[kSize * at + B * c + r] = static_cast<float>(value[kSize * e + B * r + c]);
+      });
   });
   std::vector<Index> bad = set_diagonals();
   set_excess();

@@ -3,7 +3,9 @@
 // Smoothing is a Gauss-Seidel sweep inside each of a fixed number of row chunks, all chunks at once
 // (so the result does not depend on the number of threads). To let the sweeps run without a branch
 // the entries of a row are stored in three groups: columns in other chunks, earlier columns of the
-// same chunk, later columns of the same chunk; the diagonal is kept apart. Blocks are B x B.
+// same chunk, later columns of the same chunk; the diagonal is kept apart. What a forward sweep
+// reads before and after it knows a row's result lies apart, too: sweeps are as fast as memory
+// delivers. Blocks are B x B.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +17,12 @@ namespace stretchmap::linalg {
 
 inline constexpr std::size_t kPadding = 3;  // numbers the sweeps may read beyond the last block
 
+// Entries of all rows, one row after the other, in single precision.
+struct SweepEntries {
+  std::vector<Index> start, col;
+  std::vector<float> value;  // column-major blocks, and kPadding more numbers
+};
+
 template <int B>
 struct LevelMatrix {
   Index n = 0;      // block rows
@@ -24,7 +32,10 @@ struct LevelMatrix {
   std::vector<Index> start, lower, upper, col;
   std::vector<Index> source, diagonal_source;  // where the values come from, see set_values
   std::vector<double> value, diagonal;         // row-major blocks
-  std::vector<float> value_f, inverse_f;       // column-major; inverse of the (enlarged) diagonal
+  // Earlier columns of the same chunk; all others, the later ones of row i from later[i] on.
+  SweepEntries earlier, rest;
+  std::vector<Index> later;
+  std::vector<float> inverse_f;  // column-major; inverse of the (enlarged) diagonal
   // The diagonal is enlarged by 1 / (1 - excess) in rows whose couplings to other chunks would
   // otherwise make the simultaneous sweeps diverge; zero nearly everywhere.
   std::vector<float> excess;
@@ -56,6 +67,14 @@ struct LevelMatrix {
   void scaled_multiply(const float* x, float* y) const;
 
  private:
+  // visit(entries, position there, entry here) for the entries of row i.
+  template <class Visit>
+  void for_sweep_entries(Index i, const Visit& visit) {
+    for (Index e = lower[i]; e < upper[i]; ++e) visit(earlier, earlier.start[i] + e - lower[i], e);
+    for (Index e = start[i]; e < lower[i]; ++e) visit(rest, rest.start[i] + e - start[i], e);
+    for (Index e = upper[i]; e < start[i + 1]; ++e) visit(rest, later[i] + e - upper[i], e);
+  }
+  void set_sweep_pattern();
   std::vector<Index> set_diagonals();
   void set_excess();
 };

@@ -71,15 +71,16 @@ template <int B>
 template <int K>
 void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
   constexpr size_t kBlock = B * B, kRow = B * K;
-  const auto subtract = [&](Index from, Index to, RowSum<B, K>& row) {
-    for (Index e = from; e < to; ++e) row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
+  const auto subtract = [&](const SweepEntries& from, Index i, RowSum<B, K>& row) {
+    for (Index e = from.start[i]; e < from.start[i + 1]; ++e)
+      row.subtract(from.value.data() + kBlock * e, x + kRow * from.col[e]);
   };
   for_chunks(
       n,
       [&](Index begin, Index end) {
         for (Index i = begin; i < end; ++i) {
           RowSum<B, K> row(b + kRow * i);
-          subtract(lower[i], upper[i], row);
+          subtract(earlier, i, row);
           row.store(row.transform(inverse_f.data() + kBlock * i, row.total()), x + kRow * i);
         }
       },
@@ -88,12 +89,11 @@ void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       RowSum<B, K> row;
-      subtract(start[i], lower[i], row);
-      subtract(upper[i], start[i + 1], row);
+      subtract(rest, i, row);
       auto total = row.total();
       if (excess[i] > 0.0f) {
         RowSum<B, K> enlarged(b + kRow * i);
-        subtract(lower[i], upper[i], enlarged);
+        subtract(earlier, i, enlarged);
         total += excess[i] * enlarged.total();
       }
       row.store(total, r + kRow * i);
@@ -109,15 +109,18 @@ void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) co
       n,
       [&](Index begin, Index end) {
         for (Index i = end - 1; i >= begin; --i) {
-          RowSum<B, K> row(b + kRow * i);
-          for (Index e = start[i]; e < upper[i]; ++e)
-            row.subtract(value_f.data() + kBlock * e, y + kRow * col[e]);
-          // The nearest rows, whose results were written last, at the end.
-          for (Index e = start[i + 1] - 1; e >= upper[i]; --e)
-            row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
-          auto moved = row.transform(inverse_f.data() + kBlock * i, row.total());
+          // Backwards through memory, too; the nearest row, whose result was written last, at the
+          // end of what waits for such.
+          RowSum<B, K> known(b + kRow * i), next;
+          for (Index e = rest.start[i + 1] - 1; e >= later[i]; --e)
+            next.subtract(rest.value.data() + kBlock * e, x + kRow * rest.col[e]);
+          for (Index e = later[i] - 1; e >= rest.start[i]; --e)
+            known.subtract(rest.value.data() + kBlock * e, y + kRow * rest.col[e]);
+          for (Index e = earlier.start[i + 1] - 1; e >= earlier.start[i]; --e)
+            known.subtract(earlier.value.data() + kBlock * e, y + kRow * earlier.col[e]);
+          auto moved = known.transform(inverse_f.data() + kBlock * i, known.total() + next.total());
           moved += excess[i] * RowSum<B, K>(y + kRow * i).total();
-          row.store(moved, x + kRow * i);
+          known.store(moved, x + kRow * i);
         }
       },
       chunk);
@@ -129,8 +132,9 @@ void LevelMatrix<B>::scaled_multiply(const float* x, float* y) const {
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       RowSum<B, 1> row;
-      for (Index e = start[i]; e < start[i + 1]; ++e)
-        row.subtract(value_f.data() + kBlock * e, x + kRow * col[e]);
+      for (const SweepEntries* from : {&earlier, &rest})
+        for (Index e = from->start[i]; e < from->start[i + 1]; ++e)
+          row.subtract(from->value.data() + kBlock * e, x + kRow * from->col[e]);
       const auto scaled = row.transform(inverse_f.data() + kBlock * i, row.total());
       row.store(RowSum<B, 1>(x + kRow * i).total() - scaled / (1.0f - excess[i]), y + kRow * i);
     }
