@@ -46,20 +46,20 @@ class Bins {
 
 }  // namespace
 
-Rows level_histogram(const TetsRef& tets, const VecRef& values, const RowsRef& amounts, Index bins,
-                     double period, bool periodic) {
+Points2 level_histogram(const TetsRef& tets, const VecRef& values, const Points2Ref& amounts,
+                        Index bins, double period, bool periodic) {
   const Bins bins_of(tets, values, bins, period, periodic);
   const Index k = static_cast<Index>(tets.rows()), runs = (k + kRun - 1) / kRun;
-  std::vector<Rows> partial(runs);
+  std::vector<Points2> partial(runs);
 #pragma omp parallel for schedule(static)
   for (Index run = 0; run < runs; ++run) {
-    Rows& sums = partial[run];
-    sums.setZero(bins, amounts.cols());
+    Points2& sums = partial[run];
+    sums.setZero(bins, 2);
     for (Index t = kRun * run; t < std::min(k, kRun * (run + 1)); ++t)
       for (const Index bin : bins_of(t)) sums.row(bin) += 0.25 * amounts.row(t);
   }
-  Rows histogram = Rows::Zero(bins, amounts.cols());
-  for (const Rows& sums : partial) histogram += sums;
+  Points2 histogram = Points2::Zero(bins, 2);
+  for (const Points2& sums : partial) histogram += sums;
   return histogram;
 }
 

@@ -27,6 +27,19 @@ std::pair<Pattern, std::vector<Index>> transpose(const Pattern& p) {
   return {std::move(t), std::move(from)};
 }
 
+// to += a b with row-major matrices, a (R x M) or, if Transposed, (M x R). What is added to is kept
+// in registers: the compiler cannot know that the matrices do not overlap.
+template <int R, int M, int C, bool Transposed, class A, class B>
+void multiply_add(const A* a, const B* b, double* to) {
+  double sum[R * C];
+  for (int k = 0; k < R * C; ++k) sum[k] = to[k];
+  for (int r = 0; r < R; ++r)
+    for (int m = 0; m < M; ++m)
+      for (int c = 0; c < C; ++c)
+        sum[C * r + c] += a[Transposed ? R * m + r : M * r + m] * b[C * m + c];
+  for (int k = 0; k < R * C; ++k) to[k] = sum[k];
+}
+
 }  // namespace
 
 template <int B, int K>
@@ -132,11 +145,8 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
           continue;
         }
         if (of[j] < 0) continue;
-        const double* t = tentative.data() + kSize * j;
-        double* to = sum.data() + kSize * slot[of[j]];
-        for (int b = 0; b < B; ++b)
-          for (int c = 0; c < B; ++c)
-            for (int k = 0; k < K; ++k) to[K * b + k] += a[B * b + c] * t[K * c + k];
+        multiply_add<B, B, K, false>(a, tentative.data() + kSize * j,
+                                     sum.data() + kSize * slot[of[j]]);
       }
       // P = T - damping (T + D^-1 sum)
       const float* inverse = A.inverse_f.data() + static_cast<size_t>(B * B) * i;
@@ -182,11 +192,8 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) {
                 0.0);
       const auto add = [&](const double* a, Index j) {
         for (Index e = p.start[j]; e < p.start[j + 1]; ++e) {
-          const float* from = p_value.data() + kSize * e;
-          double* to = product_.data() + kSize * slot[p.col[e]];
-          for (int b = 0; b < B; ++b)
-            for (int c = 0; c < B; ++c)
-              for (int k = 0; k < K; ++k) to[K * b + k] += a[B * b + c] * from[K * c + k];
+          multiply_add<B, B, K, false>(a, p_value.data() + kSize * e,
+                                       product_.data() + kSize * slot[p.col[e]]);
         }
       };
       add(A.diagonal.data() + static_cast<size_t>(B * B) * i, i);
@@ -204,11 +211,8 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) {
             const Index i = r.col[e];
             const float* left = r_value.data() + kSize * e;
             for (Index f = ap.start[i]; f < ap.start[i + 1]; ++f) {
-              const double* right = product_.data() + kSize * f;
-              double* to = values.data() + kCoarse * slot[ap.col[f]];
-              for (int b = 0; b < B; ++b)
-                for (int k = 0; k < K; ++k)
-                  for (int l = 0; l < K; ++l) to[K * k + l] += left[K * b + k] * right[K * b + l];
+              multiply_add<K, B, K, true>(left, product_.data() + kSize * f,
+                                          values.data() + kCoarse * slot[ap.col[f]]);
             }
           }
           // A mode the aggregate cannot represent: an equation of its own keeps the matrix regular.

@@ -11,7 +11,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::RowVector3d;
 using Eigen::Vector3d;
-using Block = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using Block = Eigen::Map<RowMatrix3d>;
 
 // Sum in blocks of fixed size: the result does not depend on the number of threads.
 double blocked_sum(const Vec& values) {
@@ -21,6 +22,14 @@ double blocked_sum(const Vec& values) {
   for (Index first = 0; first < n; first += kBlock)
     sum += values.segment(first, std::min(kBlock, n - first)).sum();
   return sum;
+}
+
+// to += block, two numbers at a time.
+void add_block(const RowMatrix3d& block, double* to) {
+  using Eight = Eigen::Array<double, 8, 1>;
+  Eigen::Map<Eight> head(to);
+  head += Eigen::Map<const Eight>(block.data());
+  to[8] += block(2, 2);
 }
 
 // Smallest root in (0, limit] of d0 + d1 a + d2 a^2 + d3 a^3 with d0 > 0; limit if there is none.
@@ -125,7 +134,7 @@ void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Inde
   if (!blocks) return;
 
   // Rows and columns of the first vertex are minus the sums of the others'.
-  std::array<std::array<Matrix3d, 4>, 4> H;
+  std::array<std::array<RowMatrix3d, 4>, 4> H;
   int at = 0;
   for (int a = 1; a < 4; ++a) {
     for (int b = a; b < 4; ++b, ++at) {
@@ -143,7 +152,7 @@ void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Inde
     if (row[a] < 0) continue;
     for (int b = 0; b < 4; ++b)
       if (const Index slot = slot_(t, 4 * a + b); slot >= 0)
-        Block(blocks + 9 * static_cast<std::ptrdiff_t>(slot)) += H[a][b];
+        add_block(H[a][b], blocks + 9 * static_cast<std::ptrdiff_t>(slot));
   }
 }
 
@@ -189,9 +198,8 @@ void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, 
     if (row < first || row >= last) continue;
     gradient.row(row).head<2>() += w.face * g.segment<2>(2 * a).transpose();
     for (int b = 0; blocks && b < 3; ++b) {
-      const Index at = find_block(row, vertex_row_[barrier_.faces()(f, b)]);
-      Block(blocks + 9 * static_cast<std::ptrdiff_t>(at)).topLeftCorner<2, 2>() +=
-          w.face * H.block<2, 2>(2 * a, 2 * b);
+      Block(blocks + 9 * static_cast<std::ptrdiff_t>(face_slot_(f, 3 * a + b)))
+          .topLeftCorner<2, 2>() += w.face * H.block<2, 2>(2 * a, 2 * b);
     }
   }
 }

@@ -1,8 +1,8 @@
 // How SolidEnergy numbers its rows and elements, and the block pattern of its Hessian.
 #include <algorithm>
-#include <limits>
 #include <numeric>
 
+#include "../linalg/pattern.hpp"
 #include "stretchmap/stretch/solid_energy.hpp"
 
 #ifdef _OPENMP
@@ -54,16 +54,17 @@ SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef&
   vertex_row_.setConstant(n, -1);
   for (Index row = 0; row < row_vertex_.size(); ++row) vertex_row_[row_vertex_[row]] = row;
 
-  std::vector<Index> lowest(k);
-  order_.resize(k);
+  // Tets by their lowest row, those without any at the end.
+  std::vector<Index> start(row_vertex_.size() + 2, 0), lowest(k);
   for (Index t = 0; t < k; ++t) {
-    lowest[t] = std::numeric_limits<Index>::max();
+    lowest[t] = static_cast<Index>(row_vertex_.size());
     for (int a = 0; a < 4; ++a)
       if (vertex_row_[tets(t, a)] >= 0) lowest[t] = std::min(lowest[t], vertex_row_[tets(t, a)]);
+    ++start[lowest[t] + 1];
   }
-  std::iota(order_.data(), order_.data() + k, 0);
-  std::stable_sort(order_.data(), order_.data() + k,
-                   [&](Index a, Index b) { return lowest[a] < lowest[b]; });
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  order_.resize(k);
+  for (Index t = 0; t < k; ++t) order_[start[lowest[t]]++] = t;
   tets_.resize(k, 4);
   rest_.resize(k, 9);
   weights_.resize(k);
@@ -77,45 +78,49 @@ SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef&
 
 void SolidEnergy::build_pattern() {
   const Index n_rows = rows(), k = static_cast<Index>(tets_.rows());
-  // Incidence row -> tets, then the sorted union of their rows.
+  // 4 tet + corner for every corner of each row.
   std::vector<Index> start(n_rows + 1, 0);
   for (Index t = 0; t < k; ++t)
     for (int a = 0; a < 4; ++a)
       if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) ++start[row + 1];
-  for (Index row = 0; row < n_rows; ++row) start[row + 1] += start[row];
-  std::vector<Index> incident(start[n_rows]), cursor(start.begin(), start.end() - 1);
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<Index> corner(start[n_rows]), cursor(start.begin(), start.end() - 1);
   for (Index t = 0; t < k; ++t)
     for (int a = 0; a < 4; ++a)
-      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) incident[cursor[row]++] = t;
-
-  row_ptr_.resize(n_rows + 1);
-  row_ptr_[0] = 0;
-  std::vector<Index> columns, neighbours;
-  for (Index row = 0; row < n_rows; ++row) {
-    neighbours.assign(1, row);
+      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) corner[cursor[row]++] = 4 * t + a;
+  const auto for_corners = [&](Index row, const auto& visit) {
     for (Index p = start[row]; p < start[row + 1]; ++p)
-      for (int a = 0; a < 4; ++a)
-        if (const Index other = vertex_row_[tets_(incident[p], a)]; other >= 0)
-          neighbours.push_back(other);
-    std::sort(neighbours.begin(), neighbours.end());
-    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
-    columns.insert(columns.end(), neighbours.begin(), neighbours.end());
-    row_ptr_[row + 1] = static_cast<Index>(columns.size());
-  }
-  col_ = Eigen::Map<const IndexVec>(columns.data(), static_cast<Index>(columns.size()));
+      for (int b = 0; b < 4; ++b)
+        if (const Index other = vertex_row_[tets_(corner[p] / 4, b)]; other >= 0)
+          visit(corner[p], b, other);
+  };
+
+  const linalg::Pattern pattern =
+      linalg::build_pattern(n_rows, n_rows, [&](Index row, linalg::RowSet& set) {
+        set.add(row);
+        for_corners(row, [&](Index, int, Index other) { set.add(other); });
+      });
+  row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n_rows + 1);
+  col_ = Eigen::Map<const IndexVec>(pattern.col.data(), static_cast<Index>(pattern.col.size()));
 
   slot_.setConstant(k, 16, -1);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
-    for (int a = 0; a < 4; ++a) {
-      const Index row = vertex_row_[tets_(t, a)];
-      if (row < 0) continue;
-      for (int b = 0; b < 4; ++b) {
-        const Index other = vertex_row_[tets_(t, b)];
-        if (other >= 0) slot_(t, 4 * a + b) = find_block(row, other);
-      }
-    }
-  }
+  linalg::for_chunks_with(
+      n_rows, [&] { return std::vector<Index>(n_rows); },
+      [&](Index begin, Index end, std::vector<Index>& place) {
+        for (Index row = begin; row < end; ++row) {
+          for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p) place[col_[p]] = p;
+          for_corners(row, [&](Index at, int b, Index other) {
+            slot_(at / 4, 4 * (at % 4) + b) = place[other];
+          });
+        }
+      });
+  const Index m = barrier_.size();
+  face_slot_.setConstant(m, 9, -1);
+  for (Index f = 0; f < m; ++f)
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        face_slot_(f, 3 * a + b) =
+            find_block(vertex_row_[barrier_.faces()(f, a)], vertex_row_[barrier_.faces()(f, b)]);
 
   const Index parts = std::max<Index>(1, std::min<Index>(thread_count(), n_rows));
   part_row_.resize(parts + 1);

@@ -91,6 +91,7 @@ class SolidEnergy {
   IndexVec vertex_row_;          // row of each vertex, -1 if fixed
   IndexVec row_ptr_, col_;       // block pattern
   IndexRows slot_;               // (k, 16) block of each pair of a tet's vertices, -1 if none
+  IndexRows face_slot_;          // (m, 9) the same of a face's vertices
   std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
   std::vector<std::vector<Index>> part_tets_;   // tets that touch them, ascending
   std::vector<std::vector<Index>> part_faces_;  // and faces
