@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import time
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from ._loosen import untangle_refining
 from .area import AreaMap
 from .certificate import certify
 from .errors import ArrayError, DegenerateError
@@ -45,6 +47,7 @@ class SolidProblem:
     torus: Torus
     scale: float  # lengths of the result per length here
     warm: bool  # x is a whole map, not only its boundary
+    refinement: Refinement | None  # that made the solid; None: it must not be refined
 
     @classmethod
     def build(
@@ -74,7 +77,7 @@ class SolidProblem:
         shrink = enclosed ** (-1.0 / 3.0)
         scale = solid.volume ** (1.0 / 3.0)
         V = (mesh.V - mesh.V.mean(axis=0)) / scale
-        return cls(mesh, V, x * shrink, torus.scaled(shrink), scale, start is not None)
+        return cls(mesh, V, x * shrink, torus.scaled(shrink), scale, start is not None, refinement)
 
     @property
     def fixed(self) -> NDArray[np.uint8]:
@@ -143,10 +146,11 @@ def certified_route(
     vertex_exact: bool,
     solver: str,
     progress: Progress | None,
-) -> SolidRun:
+) -> tuple[SolidProblem, SolidRun]:
     """Untangle, minimise with the boundary held, let it glide, equalise.
 
-    A map that starts warm has been through the first stages before.
+    A map that starts warm has been through the first stages before. The problem comes back with its
+    solid refined where untangling asked for it.
     """
     solid, x = problem.solid, problem.x
     seconds: dict[str, float] = {}
@@ -167,7 +171,16 @@ def certified_route(
         progress=progress,
     )
     clock = time.perf_counter()
-    x, flips = flip_free.untangle(x, glide=glide)
+    if problem.refinement is None:
+        x, flips = flip_free.untangle(x, glide=glide)
+    else:
+        flip_free, refinement, x, flips = untangle_refining(
+            flip_free, problem.refinement, x, glide=glide
+        )
+        solid = refinement.solid
+        problem = dataclasses.replace(
+            problem, solid=solid, V=flip_free.V, x=x, refinement=refinement
+        )
     seconds["untangle"] = time.perf_counter() - clock
     converged, stop_reason = False, f"{flips} tets and faces could not be untangled"
     if flips == 0:
@@ -200,4 +213,4 @@ def certified_route(
         if not exact:
             _log.warning("ring volumes left as they were: %s", reason)
     history += tuple(flip_free.history)
-    return SolidRun(x, history, converged, stop_reason, seconds, exact)
+    return problem, SolidRun(x, history, converged, stop_reason, seconds, exact)

@@ -28,6 +28,8 @@ __all__ = ["FlipFreeOptions", "FlipFreeSolver"]
 _FREE, _FIXED, _GLIDING = 0, 1, 2
 _PATIENCE = 10  # untangling steps without progress before something else is tried
 _RESTARTS = 3  # of the continuation, from a large epsilon
+_WIDEST = 1.0  # epsilon: determinants are 1 where all is well, a larger one tells nothing apart
+_SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 _NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
 
 
@@ -171,7 +173,9 @@ class FlipFreeSolver:
             self.progress, stage, iteration, total, flips=record.flips, element_sd=record.element_sd
         )
 
-    def untangle(self, x: NDArray[np.float64], *, glide: bool) -> tuple[NDArray[np.float64], int]:
+    def untangle(
+        self, x: NDArray[np.float64], *, glide: bool, few: int = 0
+    ) -> tuple[NDArray[np.float64], int]:
         """Turn every inverted tet: foldover-free mapping by continuation.
 
         First with the boundary held; if ``glide`` and inverted tets or folded boundary faces are
@@ -179,18 +183,27 @@ class FlipFreeSolver:
         (Garanzha et al., 2021, section 3.2); between two steps the energy may rise because epsilon
         changed, within a step it cannot.
 
+        Parameters
+        ----------
+        x : ndarray, shape (n, 3)
+        glide : bool
+        few : int
+            So many inverted tets are not worth patience: give up on them soon.
+
         Returns
         -------
         x : ndarray, shape (n, 3)
         flips : int
             Inverted tets, and folded faces if ``glide``, that are left; zero means success.
         """
-        x, left = self._untangle(x, glide=False)
+        x, left = self._untangle(x, glide=False, few=few)
         if glide:
-            x, left = self._untangle(x, glide=True)
+            x, left = self._untangle(x, glide=True, few=few)
         return x, left
 
-    def _untangle(self, x: NDArray[np.float64], *, glide: bool) -> tuple[NDArray[np.float64], int]:
+    def _untangle(
+        self, x: NDArray[np.float64], *, glide: bool, few: int
+    ) -> tuple[NDArray[np.float64], int]:
         o = self.options
         face = o.face_weight if glide else 0.0
         newton = self._newton(x, _GLIDING if glide else _FIXED)
@@ -198,11 +211,11 @@ class FlipFreeSolver:
         state = newton.value(x, _core.EnergyWeights(1.0, 1.0, 1.0, face))
         left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
         fewest, since, restarts = left, 0, 0
-        epsilon = first = max(0.2 * abs(worst), 10.0 * o.floor)
+        epsilon = first = min(max(0.2 * abs(worst), 10.0 * o.floor), _WIDEST)
         for iteration in range(1, o.untangle_iter + 1):
             if left == 0 and (worst >= o.floor or since >= _PATIENCE):
                 break
-            if since >= 3 * _PATIENCE:
+            if since >= _PATIENCE * (3 if left > few else 1):
                 # Stuck with epsilon small: the way out is over a higher pass.
                 if not glide or restarts == _RESTARTS:
                     break
@@ -216,7 +229,8 @@ class FlipFreeSolver:
             left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
             since = 0 if left < fewest else since + 1
             fewest = min(fewest, left)
-            epsilon = _next_epsilon(epsilon, step.before.energy, after.energy, worst)
+            if step.before.energy - after.energy <= _SETTLED * (step.before.energy + 2.0):
+                epsilon = _next_epsilon(epsilon, worst)
         return x, int(left)
 
     def minimise(
@@ -353,9 +367,8 @@ class FlipFreeSolver:
         return moved, True, ""
 
 
-def _next_epsilon(epsilon: float, before: float, after: float, worst: float) -> float:
-    """Regularisation for the next step, from the decrease achieved and the worst determinant."""
-    gain = max(0.1, 1.0 - after / before)
+def _next_epsilon(epsilon: float, worst: float) -> float:
+    """Regularisation for the next step, from the worst determinant (Garanzha et al., 2021)."""
     chi = 0.5 * (worst + math.sqrt(epsilon * epsilon + worst * worst))
-    goal = (1.0 - gain) * chi
+    goal = 0.9 * chi
     return 2.0 * math.sqrt(max(goal * (goal - worst), 1e-24))

@@ -1,11 +1,15 @@
-"""Splitting of interior edges and faces whose vertices all lie on the boundary.
+"""Refining a solid where it is too coarse for a map: at its boundary, inside, along single edges.
 
-Such an edge or face is placed by the boundary map alone, so no solver that works inside can repair
-a flip there. A vertex at its midpoint or centroid sets it free.
+An interior edge or face whose vertices all lie on the boundary is placed by the boundary map alone,
+so no solver that works inside can repair a flip there. A vertex at its midpoint or centroid sets it
+free. Likewise, an interior vertex with a good part of the boundary round it may have no place from
+where it sees the inner side of all those faces; halving the edges from it to the boundary gives
+them vertices of their own to be seen by.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,24 +57,29 @@ class Refinement:
     ----------
     solid : TetMesh
         Its first n vertices are those of the input, unchanged, and its boundary is the same. Then
-        follow the midpoints of ``parents`` and the centroids of ``face_parents``.
+        follow the midpoints of ``parents``, the centroids of ``face_parents`` and the midpoints of
+        ``halved``.
     parents : (a, 2) ndarray of int32
         Vertices of the edge each added midpoint halves.
     face_parents : (b, 3) ndarray of int32
         Vertices of the face each added centroid lies in.
     parent_tet : (k',) ndarray of int32
         Input tet of each tet, ascending.
+    halved : tuple of (c, 2) ndarrays of int32
+        Edges halved after that, those of one pass in one array; their ends may have been added
+        before.
     """
 
     solid: TetMesh
     parents: NDArray[np.int32]
     face_parents: NDArray[np.int32]
     parent_tet: NDArray[np.int32]
+    halved: tuple[NDArray[np.int32], ...] = ()
 
     @property
     def n_split(self) -> int:
         """Number of edges and faces split: the number of added vertices."""
-        return len(self.parents) + len(self.face_parents)
+        return sum(map(len, (self.parents, self.face_parents, *self.halved)))
 
     @property
     def n_added_tets(self) -> int:
@@ -101,7 +110,36 @@ class Refinement:
             raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
         rows: list[NDArray[Any]] = [array]
         rows += [array[ids].mean(axis=1) for ids in (self.parents, self.face_parents) if len(ids)]
-        return np.concatenate(rows)
+        array = np.concatenate(rows)
+        for ids in self.halved:
+            array = np.concatenate([array, array[ids].mean(axis=1)])
+        return array
+
+    def halve(self, edges: NDArray[np.int32]) -> Refinement:
+        """Halve interior edges of ``solid``, with all tets round them; none may be left over.
+
+        Parameters
+        ----------
+        edges : (e, 2) ndarray of int32
+            Different interior edges of ``solid``. Of those with a tet in common, the first is
+            halved first.
+
+        Returns
+        -------
+        Refinement
+            Of the same input.
+        """
+        solid, parent, passes = self.solid, self.parent_tet, list(self.halved)
+        while len(edges):
+            split = split_edges(solid, edges, np.full(len(edges), 0.5))
+            order = np.argsort(parent[split.parent_tet], kind="stable")
+            parent = parent[split.parent_tet][order]
+            solid = TetMesh(split.solid.V, split.solid.T[order])
+            passes.append(read_only(edges[split.kept]))
+            edges = np.delete(edges, split.kept, axis=0)
+        return dataclasses.replace(
+            self, solid=solid, parent_tet=read_only(parent), halved=tuple(passes)
+        )
 
 
 def boundary_joins(solid: TetMesh) -> BoundaryJoins:
@@ -174,10 +212,13 @@ class EdgeSplit:
         Its first n vertices are those of the input, then one on each edge that was split.
     kept : ndarray of intp, shape (a,)
         The edges that were split, ascending.
+    parent_tet : ndarray of intp, shape (k',)
+        Input tet of each tet.
     """
 
     solid: TetMesh
     kept: NDArray[np.intp]
+    parent_tet: NDArray[np.intp]
 
 
 def split_edges(solid: TetMesh, edges: NDArray[np.int32], shares: NDArray[np.float64]) -> EdgeSplit:
@@ -216,4 +257,31 @@ def split_edges(solid: TetMesh, edges: NDArray[np.int32], shares: NDArray[np.flo
     ends = solid.V[edges[kept]]
     share = shares[kept, None]
     V = np.concatenate([solid.V, (1.0 - share) * ends[:, 0] + share * ends[:, 1]])
-    return EdgeSplit(TetMesh(V, T), kept)
+    parent = np.concatenate([np.flatnonzero(new < 0), cut, cut])
+    return EdgeSplit(TetMesh(V, T), kept, parent)
+
+
+def crowded_edges(solid: TetMesh, tets: NDArray[np.intp]) -> NDArray[np.int32]:
+    """Edges to halve so that the interior vertices of some tets see fewer faces of the boundary.
+
+    Parameters
+    ----------
+    solid : TetMesh
+        Without boundary joins.
+    tets : ndarray of intp
+
+    Returns
+    -------
+    (e, 2) ndarray of int32
+        The edges from each interior vertex of those tets to the boundary, in lexicographic order;
+        if there are none, the edges of those tets.
+    """
+    inside = solid.boundary_index < 0
+    stuck = np.zeros(solid.n_vertices, bool)
+    stuck[solid.T[tets]] = True
+    first, second = solid.edges.T
+    chosen = (stuck & inside)[first] & ~inside[second] | (stuck & inside)[second] & ~inside[first]
+    if chosen.any():
+        return np.ascontiguousarray(solid.edges[chosen])
+    own = np.sort(solid.T[tets][:, _TET_EDGES].reshape(-1, 2), axis=1)
+    return np.unique(own, axis=0)

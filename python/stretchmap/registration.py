@@ -22,6 +22,7 @@ from . import _core
 from ._arrays import read_only
 from ._embed import EmbeddedBoundary, embed_boundary, unfold_boundary
 from ._flat import FlatSurface, Gauge, choose_gauge
+from ._loosen import untangle_refining
 from ._match import affine_landmark_map, match_surfaces
 from .certificate import Certificate, certify
 from .errors import (
@@ -298,7 +299,10 @@ def _fill(
         V=V, T=solid.T, boundary=ids, faces=ids[source.surface.F], R=2.0, r=1.0, options=options,
         progress=progress,
     )  # fmt: skip
-    x, flips = flip_free.untangle(run.image, glide=False)
+    flip_free, refinement, x, flips = untangle_refining(
+        flip_free, refinement, run.image, glide=False
+    )
+    solid = refinement.solid
     converged, stop_reason = False, f"{flips} tets could not be untangled"
     if flips == 0:
         x, converged, stop_reason = flip_free.minimise(

@@ -172,7 +172,7 @@ def volume_map(
         result says whether it was done.
     refine : bool
         Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
-        can repair. False: refuse such a mesh.
+        can repair, and edges round single tets that stay inverted. False: refuse such a mesh.
     keep_best : bool
         Return the best map found even if it is not certified.
     solver : {"auto", "direct", "multigrid", "jacobi", "cholmod"}
@@ -245,7 +245,7 @@ def volume_map(
     problem = SolidProblem.build(solid, refinement, boundary_map, start, torus)
     if certified:
         boundary = boundary or "glide"
-        run = certified_route(
+        problem, run = certified_route(
             problem, _with_overrides(options or FlipFreeOptions(), max_iter, tol),
             glide=boundary == "glide", vertex_exact=vertex_exact, solver=solver, progress=progress,
         )  # fmt: skip
@@ -255,7 +255,7 @@ def volume_map(
             problem, c=c or 0.0, max_iter=20 if max_iter is None else max_iter,
             tol=1e-6 if tol is None else tol, solver=solver, progress=progress,
         )  # fmt: skip
-    result = _result(problem, run, method, boundary, boundary_map, refinement, seconds)
+    result = _result(problem, run, method, boundary, boundary_map, seconds)
     if certified and not result.certificate.certified and not keep_best:
         ids = next(iter(result.certificate.ids.values()), ())
         raise CertificationError(
@@ -323,10 +323,9 @@ def _result(
     method: str,
     boundary: str,
     boundary_map: AreaMap | None,
-    refinement: Refinement | None,
     seconds: dict[str, float],
 ) -> VolumeMap:
-    scale = problem.result_scale(run.x)
+    scale, refinement = problem.result_scale(run.x), problem.refinement
     image, torus = run.x * scale, problem.torus.scaled(scale)
     clock = time.perf_counter()
     figures = distortion(problem.solid, image)
