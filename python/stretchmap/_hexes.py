@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from . import _core
 from ._flat import FlatSurface
+from .progress import Progress, report
 
 # Corner of a hexahedron and the three corners joined to it, positively oriented.
 CORNERS = np.array(
@@ -144,17 +145,20 @@ class GridRepair:
         self._mean_edge = total / np.bincount(edges.ravel(), minlength=len(self.V))
         self._reach = _REACH * self._mean_edge
 
-    def run(self) -> None:
+    def run(self, progress: Progress | None = None) -> None:
         """Both stages; the second only if the first got all corners positive."""
-        for _ in range(_MOST_ROUNDS):
-            if self._all_positive():
+        for done in range(_MOST_ROUNDS):
+            left = self._count_bad()
+            report(progress, "untangle", done, _MOST_ROUNDS, bad=left)
+            if left == 0:
                 break
             self._untangle()
         else:
-            if not self._all_positive():
+            if self._count_bad():
                 return
         self._reach = _REACH * self._mean_edge
-        for _ in range(_DRAW_ROUNDS):
+        for done in range(_DRAW_ROUNDS):
+            report(progress, "draw back", done, _DRAW_ROUNDS)
             self._move(self._boxes(), 0.0, _SLACK, 2.0, _PULL, _DRAW_SWEEPS)
 
     def _untangle(self) -> None:
@@ -171,8 +175,9 @@ class GridRepair:
             self.V, _ = newton.step(self.V, energy, 0.1, 60)
         self._move(rest, epsilon, 0.0, 1.0, _SOFT_PULL, _UNTANGLE_SWEEPS)
 
-    def _all_positive(self) -> bool:
-        return bool((jacobians(self.V, self.H) > 0.0).all())
+    def _count_bad(self) -> int:
+        """Hexahedra with a corner that is not positive."""
+        return int((~(jacobians(self.V, self.H) > 0.0)).any(axis=1).sum())
 
     def _boxes(self) -> NDArray[np.float64]:
         """(8 k, 9) rest matrices: a box with the mean edges of each hexahedron and its volume."""

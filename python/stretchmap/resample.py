@@ -22,6 +22,7 @@ from ._arrays import read_only
 from ._flat import FlatSurface
 from ._hexes import GridRepair, corner_tets, hex_volumes, jacobians, o_grid
 from .errors import ArrayError, FileFormatError, MissingDependencyError, OptionError, SolverError
+from .progress import Progress
 from .results import atomic_path, plain, table
 from .torus import TWO_PI, Torus
 
@@ -149,6 +150,7 @@ def hex_mesh(
     block: int = 4,
     rings: int = 4,
     repair: bool = True,
+    progress: Progress | None = None,
 ) -> HexMesh:
     """Pull a structured grid of the solid torus back to the source.
 
@@ -168,6 +170,8 @@ def hex_mesh(
     repair : bool
         Make all corner Jacobians positive where the pulled-back grid leaves some that are not, or
         below 0.05 when scaled by the edges.
+    progress : Progress, optional
+        Called once per round of the repair.
 
     Returns
     -------
@@ -214,7 +218,7 @@ def hex_mesh(
     shares = hex_volumes(grid, H)
     shares /= shares.sum()
     if repair and not quality.min() >= _LEAST:
-        V = _repaired(result, pulled, H, shares, ids.astype(np.int32), u[ids], v[ids])
+        V = _repaired(result, pulled, H, shares, ids.astype(np.int32), u[ids], v[ids], progress)
         quality = jacobians(V, H)
         left = np.flatnonzero(~(quality > 0.0).all(axis=1))
         if len(left):
@@ -261,6 +265,7 @@ def _repaired(
     rim: NDArray[np.int32],
     u: NDArray[np.float64],
     v: NDArray[np.float64],
+    progress: Progress | None,
 ) -> NDArray[np.float64]:
     """The points after `GridRepair`; u and v are those of the rim."""
     solid, torus = result.mesh, result.torus
@@ -280,7 +285,7 @@ def _repaired(
     if len(lost):
         y[lost] = surface.turns[cKDTree(solid.surface.V).query(V[rim[lost]])[1]]
     grid = GridRepair(V, H, shares * solid.volume, rim, surface, np.ascontiguousarray(y))
-    grid.run()
+    grid.run(progress)
     return grid.V
 
 

@@ -71,7 +71,13 @@ def test_a_tangled_grid_is_repaired(vertebra_map):
     raw = hex_mesh(result, sections=40, repair=False)
     assert raw.n_negative == raw.n_pulled_back_negative > 0
     assert raw.moved == raw.rim_moved == 0.0
-    mesh = hex_mesh(result, sections=40)
+    seen = []
+    mesh = hex_mesh(
+        result,
+        sections=40,
+        progress=lambda stage, done, total, **values: seen.append((stage, values)),
+    )
+    assert seen[0] == ("untangle", {"bad": raw.n_negative}) and seen[-1][0] == "draw back"
     assert mesh.n_negative == 0 and mesh.jacobians.min() > 0.05
     rim = np.arange(len(mesh.V)).reshape(40, -1)[:, -16:].ravel()
     size = np.linalg.norm(np.ptp(raw.V, axis=0))

@@ -188,12 +188,15 @@ def resample(
 
     The mesh is structured; exit code 1 if a corner Jacobian is not positive.
     """
+    from ..progress import terminal
     from ..resample import hex_mesh
 
     common.check_outputs(output, (".vtu", ".vtk"), json, map_file)
-    mesh = hex_mesh(
-        _solid_map(map_file, "resample"), sections=sections, block=block, rings=rings, repair=repair
-    )
+    result = _solid_map(map_file, "resample")
+    with terminal(quiet) as bar:
+        mesh = hex_mesh(
+            result, sections=sections, block=block, rings=rings, repair=repair, progress=bar
+        )
     common.write_together(output, mesh.save, json, mesh.to_dict())
     if not quiet:
         typer.echo(mesh.summary())
