@@ -1,7 +1,9 @@
 #include "stretchmap/linalg/block_ldlt.hpp"
 
 #include <Eigen/OrderingMethods>
+#include <algorithm>
 
+#include "block_update.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap {
@@ -82,7 +84,16 @@ template <int K>
 void BlockLdlt<K>::factorise(const SparseMatrix& A, const Poll& poll) {
   std::vector<Index> filled(start_.begin(), start_.end() - 1), mark(order_.size(), -1);
   std::vector<Index> path(order_.size()), pattern(order_.size());
-  std::vector<Block> work(order_.size(), Block::Zero());
+  constexpr int kSize = linalg::kWorkBlock<K>, kColumn = kSize / K;
+  std::vector<double> work(kSize * order_.size(), 0.0);
+  const auto take = [&](Index i) {  // a block out of the row
+    double* from = work.data() + kSize * static_cast<std::size_t>(i);
+    Block block;
+    for (int d = 0; d < K; ++d)
+      for (int c = 0; c < K; ++c) block(c, d) = from[kColumn * d + c];
+    std::fill_n(from, kSize, 0.0);
+    return block;
+  };
   for (Index k = 0; k < n_; ++k) {
     if (poll && k % 256 == 0) poll();
     mark[k] = k;
@@ -93,7 +104,9 @@ void BlockLdlt<K>::factorise(const SparseMatrix& A, const Poll& poll) {
       Index i = place_[row.column(e)];
       if (i > k) continue;
       for (int c = 0; c < K; ++c)
-        for (int d = 0; d < K; ++d) work[i](c, d) = A.valuePtr()[row.first + c * width + K * e + d];
+        for (int d = 0; d < K; ++d)
+          work[kSize * static_cast<std::size_t>(i) + kColumn * d + c] =
+              A.valuePtr()[row.first + c * width + K * e + d];
       Index length = 0;
       for (; mark[i] != k; i = parent_[i]) {
         path[length++] = i;
@@ -101,16 +114,19 @@ void BlockLdlt<K>::factorise(const SparseMatrix& A, const Poll& poll) {
       }
       while (length > 0) pattern[--top] = path[--length];
     }
-    Block pivot = work[k];
-    work[k].setZero();
+    Block pivot = take(k);
     for (; top < n_; ++top) {
       const Index i = pattern[top];
-      Block y = work[i];  // becomes row block (k, i) of L D
-      work[i].setZero();
+      Block y = take(i);  // becomes row block (k, i) of L D
       for (int c = 1; c < K; ++c)
         for (int d = 0; d < c; ++d) y.col(c) -= unit_[i](c, d) * y.col(d);
-      for (Index p = start_[i]; p < filled[i]; ++p)
-        work[row_[p]].noalias() -= y * lower_[p].transpose();
+      if (const Index count = filled[i] - start_[i]; count > 0) {
+        double padded[kSize] = {};
+        for (int d = 0; d < K; ++d)
+          for (int c = 0; c < K; ++c) padded[kColumn * d + c] = y(c, d);
+        const auto subtract = K == 2 ? linalg::subtract_updates_2 : linalg::subtract_updates_3;
+        subtract(work.data(), padded, row_.data() + start_[i], lower_[start_[i]].data(), count);
+      }
       const Block entry = y * diagonal_[i].cwiseInverse().asDiagonal();
       pivot.noalias() -= entry * y.transpose();
       row_[filled[i]] = k;
