@@ -4,7 +4,9 @@ The image's vertices lie on the target's surface, but its triangles are flat. Wh
 sharply inside a triangle, the flat one may be turned over in the target's flat torus; where the
 target folds sharply between them, or is thinner than they are bent, two may cross. Such triangles
 are refined, crossing ones where their image leaves the surface most. The new vertices lie on the
-surface too, so the image follows it more and more closely there; nothing changes elsewhere.
+surface too, so the image follows it more and more closely there; nothing changes elsewhere. If that
+does not help, such triangles are cut along the edges of the target instead (`_overlay`), until they
+do not cross any more, at the latest when they lie on its surface.
 """
 
 from __future__ import annotations
@@ -18,11 +20,13 @@ from numpy.typing import NDArray
 from . import _core
 from ._flat import FlatSurface
 from ._match import SurfaceProblem
+from ._overlay import overlay_splits
 from .mesh import TetMesh, TriMesh
 from .refine import split_edges
 
 _ROUNDS = 40
 _PATIENCE = 6  # rounds that do not lower the number of crossings
+_MOST_TIMES = 20  # crossings may multiply along target edges before they vanish, but not so much
 _MOST_PAIRS = 10_000
 _NEAR, _SETTLE = 2, 10  # rings of vertices that make room for new ones, and how often each moves
 _MOST_ADDED = 0.5  # as a share of the boundary's vertices
@@ -112,8 +116,25 @@ def embed_boundary(
     held : ndarray of int32
         Boundary vertices that stay where they are: landmarks.
     """
-    crossings = first = _core.crossing_faces(points, source.surface.F, _MOST_PAIRS)
-    solid, at, images = source, y, points
+    crossings = _core.crossing_faces(points, source.surface.F, _MOST_PAIRS)
+    start = EmbeddedBoundary(source, points, crossings)
+    for way in (_follow, _overlay):
+        if not len(crossings):
+            break
+        result = way(start, target, y, held)
+        if not len(result.crossings):
+            return result
+    return start
+
+
+def _follow(
+    start: EmbeddedBoundary,
+    target: FlatSurface,
+    y: NDArray[np.float64],
+    held: NDArray[np.int32],
+) -> EmbeddedBoundary:
+    """New vertices where edges of crossing faces leave the surface most, and room made for them."""
+    solid, at, images, crossings = start.solid, y, start.points, start.crossings
     fewest, since = len(crossings), 0
     while len(crossings) and since < _PATIENCE and len(at) < (1.0 + _MOST_ADDED) * len(y):
         bad = solid.surface.F[np.unique(crossings)]
@@ -126,8 +147,32 @@ def embed_boundary(
         crossings = _core.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
         since = 0 if len(crossings) < fewest else since + 1
         fewest = min(fewest, len(crossings))
-    if len(crossings):
-        return EmbeddedBoundary(source, points, first)
+    return EmbeddedBoundary(solid, images, crossings)
+
+
+def _overlay(
+    start: EmbeddedBoundary,
+    target: FlatSurface,
+    y: NDArray[np.float64],
+    held: NDArray[np.int32],
+) -> EmbeddedBoundary:
+    """New vertices where crossing faces meet vertices and edges of the target; all others stay."""
+    solid, at, images, crossings = start.solid, y, start.points, start.crossings
+    most = min(_MOST_PAIRS - 1, _MOST_TIMES * len(crossings))
+    for _ in range(_ROUNDS):
+        enough = len(crossings) > most or len(at) > (1.0 + _MOST_ADDED) * len(y)
+        if enough or not len(crossings):
+            break
+        edges, shares, where = overlay_splits(
+            solid.surface, target, at, images, np.unique(crossings)
+        )
+        if not len(edges):
+            break
+        split = split_edges(solid, solid.boundary_vertices[edges], shares)
+        solid, where = split.solid, where[split.kept]
+        at = np.concatenate([at, where])
+        images = np.concatenate([images, target.points(where)])
+        crossings = _core.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
     return EmbeddedBoundary(solid, images, crossings)
 
 

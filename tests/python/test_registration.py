@@ -7,10 +7,11 @@ import pytest
 from scipy.spatial import cKDTree
 
 import stretchmap as sm
-from stretchmap import _core, samples
+from stretchmap import _core, _embed, samples
 from stretchmap._embed import embed_boundary, unfold_boundary
 from stretchmap._flat import FlatSurface, Gauge, choose_gauge
 from stretchmap._match import affine_landmark_map
+from stretchmap._overlay import overlay_splits
 from stretchmap.coordinates import PointMap
 from stretchmap.errors import (
     ArrayError,
@@ -19,7 +20,8 @@ from stretchmap.errors import (
     OptionError,
 )
 from stretchmap.landmarks import Landmarks, landmarks_between, read_landmarks
-from stretchmap.mesh import TetMesh
+from stretchmap.mesh import TetMesh, TriMesh
+from stretchmap.refine import split_edges
 from stretchmap.registration import register
 
 RNG = np.random.default_rng(8)
@@ -339,3 +341,32 @@ def test_contradicting_landmarks_name_the_pair_with_the_smooth_map_too(pair):
         register(pair.source, pair.target, (a, b))
     print(first, second, caught.value)
     assert {first, second} & set(caught.value.ids)
+
+
+def test_faces_cut_along_the_target_end_on_its_surface():
+    """Cut all faces as long as there is anything to cut: the image is the target, face for face."""
+    source, target = samples.solid_torus(400), FlatSurface.of(samples.bumpy_torus(1500).surface)
+    y = FlatSurface.of(source.surface).turns + np.array([0.013, 0.17])
+    n, points, solid = len(y), target.points(y), source
+    gap = [abs(_core.enclosed_volume(points, source.surface.F) / target.surface.volume - 1.0)]
+    for _ in range(60):
+        faces = np.arange(solid.surface.n_faces)
+        edges, shares, where = overlay_splits(solid.surface, target, y, points, faces)
+        if not len(edges):
+            break
+        split = split_edges(solid, solid.boundary_vertices[edges], shares)
+        solid, y = split.solid, np.concatenate([y, where[split.kept]])
+        points = target.points(y)
+        assert (flat_areas(y, solid.surface.F) > 0.0).all()
+        gap.append(
+            abs(_core.enclosed_volume(points, solid.surface.F) / target.surface.volume - 1.0)
+        )
+    assert not len(edges) and gap[0] > 1e-2 and gap[-1] < 1e-9
+    image = TriMesh(points, solid.surface.F)
+    assert image.area == pytest.approx(target.surface.area, rel=1e-9)
+    assert np.array_equal(solid.V[: source.n_vertices], source.V) and len(y) > n
+
+
+def test_crossing_faces_are_cut_along_the_target_where_following_it_fails(monkeypatch):
+    monkeypatch.setattr(_embed, "_PATIENCE", 0)  # do not even try
+    test_a_boundary_image_that_crosses_itself_is_refined()
