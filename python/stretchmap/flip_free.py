@@ -188,7 +188,8 @@ class FlipFreeSolver:
         x : ndarray, shape (n, 3)
         glide : bool
         few : int
-            So many inverted tets are not worth patience: give up on them soon.
+            So many inverted tets are not worth patience: give up on them as soon as the worst of
+            them does not get better any more.
 
         Returns
         -------
@@ -210,7 +211,7 @@ class FlipFreeSolver:
         clock = time.perf_counter()
         state = newton.value(x, _core.EnergyWeights(1.0, 1.0, 1.0, face))
         left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
-        fewest, since, restarts = left, 0, 0
+        fewest, highest, since, restarts = left, worst, 0, 0
         epsilon = first = min(max(0.2 * abs(worst), 10.0 * o.floor), _WIDEST)
         for iteration in range(1, o.untangle_iter + 1):
             if left == 0 and (worst >= o.floor or since >= _PATIENCE):
@@ -227,8 +228,10 @@ class FlipFreeSolver:
                 "untangle", iteration, x, after.energy, step.alpha, epsilon, clock, o.untangle_iter
             )
             left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
-            since = 0 if left < fewest else since + 1
-            fewest = min(fewest, left)
+            # Towards the end epsilon pulls few tets after it, and none of them beyond the floor.
+            pulled = left <= few and epsilon > 10.0 * o.floor and worst > 0.9 * highest
+            since = 0 if left < fewest or pulled else since + 1
+            fewest, highest = min(fewest, left), max(highest, worst) if since == 0 else highest
             if step.before.energy - after.energy <= _SETTLED * (step.before.energy + 2.0):
                 epsilon = _next_epsilon(epsilon, worst)
         return x, int(left)
