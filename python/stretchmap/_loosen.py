@@ -24,6 +24,8 @@ _ROUNDS = 10
 # Inverted tets as a share of all: with more, it is not a matter of single places; with so few,
 # halving is cheaper than patience.
 _MOST_STUCK, _FEW = 0.01, 0.001
+# Times the fewest so far, and so many more: halving breeds more than it cures.
+_TIMES, _MORE = 2, 100
 
 
 def untangle_refining(
@@ -55,6 +57,7 @@ def untangle_refining(
     """
     few = 0 if glide else int(_FEW * len(solver.T))
     x, left = solver.untangle(x, glide=glide, few=few)
+    best = solver, refinement, x, left
     for _ in range(_ROUNDS):
         inverted = np.flatnonzero(~(_core.signed_tet_volumes(x, solver.T) > 0.0))
         if not 0 < len(inverted) <= _MOST_STUCK * len(solver.T):
@@ -70,4 +73,8 @@ def untangle_refining(
         )  # fmt: skip
         solver = dataclasses.replace(solver, V=V, T=solid.T)
         x, left = solver.untangle(x, glide=glide, few=few)
-    return solver, refinement, x, left
+        if left < best[-1]:
+            best = solver, refinement, x, left
+        elif left > _TIMES * best[-1] + _MORE:
+            break
+    return best

@@ -30,6 +30,7 @@ _PATIENCE = 10  # untangling steps without progress before something else is tri
 _RESTARTS = 3  # of the continuation, from a large epsilon
 _WIDEST = 1.0  # epsilon: determinants are 1 where all is well, a larger one tells nothing apart
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
+_GENTLE = 0.2  # most of its volume that equalising takes from a tet
 _NO_FACES = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
 
 
@@ -277,8 +278,8 @@ class FlipFreeSolver:
     def equalise(self, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.float64]:
         """Make the volumes between level surfaces of u, v and s those of the source.
 
-        Newton steps at the largest lambda towards the targets of `Marginals`, then its shifts,
-        which leave vertices in place where a tet would lose more than a fifth of its volume: near
+        Newton steps at the largest lambda towards the targets of `Marginals`, then its shifts. Both
+        leave vertices in place where the volume of a tet would change by more than a fifth: near
         slivers, which nothing smooth can move. The recorded energy is `Marginals.error`.
 
         Returns
@@ -293,32 +294,37 @@ class FlipFreeSolver:
         self._minimiser = None
         weights = _core.EnergyWeights(1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0)
         clock, total = time.perf_counter(), o.target_iter + o.shift_iter
+        volumes = _core.signed_tet_volumes(x, self.T)
         measured = marginals.measure(x)
-        for iteration in range(o.target_iter):
-            if marginals.error(measured) < o.marginal_tol:
-                break
-            newton.set_targets(marginals.targets(measured))
-            x, step = newton.step(x, weights, o.cg_tol, o.max_cg, True)
+        for iteration in range(total):
+            if iteration < o.target_iter:
+                if marginals.error(measured) < o.marginal_tol:
+                    continue
+                newton.set_targets(marginals.targets(measured))
+                moved, step = newton.step(x, weights, o.cg_tol, o.max_cg, True)
+                alpha, change = step.alpha, step.decrement
+            else:
+                moved = marginals.shifted(x)
+                alpha, change = 1.0, float(np.linalg.norm(moved - x, axis=1).max())
+            x = self._gently_moved(x, moved, volumes)
             measured = marginals.measure(x)
             self._record(
-                "equalise", iteration + 1, x, marginals.error(measured), step.alpha, step.decrement,
-                clock, total,
-            )  # fmt: skip
-        least = 0.8 * _core.signed_tet_volumes(x, self.T)
-        stay = np.zeros(len(x), bool)
-        for iteration in range(total - o.shift_iter, total):
-            moved = marginals.shifted(x)
-            moved[stay] = x[stay]
-            while (harmed := _core.signed_tet_volumes(moved, self.T) < least).any():
-                stay[self.T[harmed]] = True
-                moved[stay] = x[stay]
-            change = float(np.linalg.norm(moved - x, axis=1).max())
-            x = moved
-            self._record(
-                "equalise", iteration + 1, x, marginals.error(marginals.measure(x)), 1.0, change,
-                clock, total,
-            )  # fmt: skip
+                "equalise", iteration + 1, x, marginals.error(measured), alpha, change, clock, total
+            )
         return x
+
+    def _gently_moved(
+        self, x: NDArray[np.float64], moved: NDArray[np.float64], volumes: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """``moved``, but ``x`` at vertices of tets too far from ``volumes``; ``x`` has none."""
+        stay = np.zeros(len(x), bool)
+        while True:
+            ratios = _core.signed_tet_volumes(moved, self.T) / volumes
+            harmed = ~((ratios > 1.0 - _GENTLE) & (ratios < 1.0 / (1.0 - _GENTLE)))
+            if not harmed.any():
+                return moved
+            stay[self.T[harmed]] = True
+            moved = np.where(stay[:, None], x, moved)
 
     def make_rings_exact(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool, str]:
         """Make the ring volume of every interior vertex exact, if that costs little.
