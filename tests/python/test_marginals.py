@@ -8,6 +8,7 @@ import pytest
 import stretchmap as sm
 from stretchmap import _core, samples
 from stretchmap._marginals import Marginals
+from stretchmap.flip_free import FlipFreeOptions, FlipFreeSolver
 
 TORUS = sm.Torus(3.0, 1.0)
 
@@ -118,3 +119,33 @@ def test_few_tets_do_no_harm():
     small = samples.solid_torus(400, R=3.0, r=1.0)
     moved = marginals(small).shifted(small.V)
     assert (_core.signed_tet_volumes(moved, small.T) > 0.0).all()
+
+
+def test_the_histogram_counts_every_tet_at_four_points(solid):
+    values = np.ascontiguousarray(TORUS.coordinates(solid.V)[2] ** 2)
+    amounts = np.column_stack([solid.tet_volumes, np.ones(solid.n_tets)])
+    far = (5.0 - np.sqrt(5.0)) / 20.0
+    weights = np.full((4, 4), far) + np.eye(4) * (1.0 - 4.0 * far)
+    bins = np.clip((values[solid.T] @ weights * 20.0).astype(int), 0, 19).ravel()
+    found = _core.level_histogram(solid.T, values, amounts, 20, 1.0, False)
+    for column, amount in zip(found.T, amounts.T, strict=True):
+        expected = np.bincount(bins, np.repeat(0.25 * amount, 4), minlength=20)
+        # A point on the border of two bins may fall into either.
+        assert np.abs(np.cumsum(column) - np.cumsum(expected)).max() < 1e-3 * amount.sum()
+        assert column.sum() == pytest.approx(amount.sum(), rel=1e-12)
+
+
+def test_equalising_takes_no_more_than_a_fifth_of_a_tet(solid):
+    ids = solid.boundary_vertices
+    solver = FlipFreeSolver(
+        V=solid.V, T=solid.T, boundary=ids, faces=ids[solid.surface.F], R=3.0, r=1.0,
+        options=FlipFreeOptions(),
+    )  # fmt: skip
+    moved = solid.V + np.random.default_rng(0).normal(scale=0.01, size=solid.V.shape)
+    kept = solver._gently_moved(solid.V, moved, solid.tet_volumes)
+    ratios = _core.signed_tet_volumes(kept, solid.T) / solid.tet_volumes
+    assert ratios.min() > 0.8 and ratios.max() < 1.25
+    ratios = _core.signed_tet_volumes(moved, solid.T) / solid.tet_volumes
+    assert ratios.min() < 0.8 or ratios.max() > 1.25
+    went = (kept != solid.V).any(axis=1)
+    assert went.any() and not went.all() and np.array_equal(kept[went], moved[went])
