@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
-from ._flat import FlatSurface
+from ._flat import FlatSurface, wrapped
 from ._match import SurfaceProblem
 from ._overlay import overlay_splits
 from .mesh import TetMesh, TriMesh
@@ -61,7 +61,7 @@ def unfold_boundary(
     solid = source
     for _ in range(_ROUNDS):
         F, bent = solid.surface.F, bend(y)
-        sides = _wrapped(bent[F[:, 1:]] - bent[F[:, :1]])
+        sides = wrapped(bent[F[:, 1:]] - bent[F[:, :1]])
         folded = np.flatnonzero(~(np.linalg.det(sides) > 0.0))
         if not len(folded) or len(y) > (1.0 + _MOST_ADDED) * source.surface.n_vertices:
             break
@@ -69,10 +69,6 @@ def unfold_boundary(
         split = split_edges(solid, solid.boundary_vertices[edges], shares)
         solid, y = split.solid, np.concatenate([y, where[split.kept]])
     return solid, bent, folded
-
-
-def _wrapped(way: NDArray[np.float64]) -> NDArray[np.float64]:
-    return way - np.round(way)
 
 
 @dataclass(frozen=True)
@@ -195,9 +191,7 @@ def _settled(
     for _ in range(_NEAR):
         loose[edges[loose[edges].any(axis=1)]] = True
     loose[held] = False
-    forms = -np.round(y[edges[:, 1]] - y[edges[:, 0]]).T
-    flat = FlatSurface(surface, np.ascontiguousarray(forms, np.int32), y)
-    problem = SurfaceProblem(flat, target)
+    problem = SurfaceProblem(FlatSurface.at(surface, y), target)
     problem.held = ~loose
     for _ in range(_SETTLE):
         y, points = problem.one_by_one(y, points)
@@ -216,7 +210,7 @@ def _worst_edges(
     """
     edges = np.sort(F[:, [[0, 1], [1, 2], [2, 0]]], axis=2)  # (m, 3, 2)
     start = y[edges[..., 0]][:, :, None]
-    way = start + _SHARES[:, None] * _wrapped(y[edges[..., 1]][:, :, None] - start)
+    way = start + _SHARES[:, None] * wrapped(y[edges[..., 1]][:, :, None] - start)
     there = place(way.reshape(-1, 2)).reshape(*way.shape[:3], -1)
     first, last = there[:, :, :1], there[:, :, -1:]
     strays = np.linalg.norm(there - first - _SHARES[:, None] * (last - first), axis=3)

@@ -21,6 +21,11 @@ _GRID = 20  # shifts tried along either coordinate
 _SAMPLE = 300  # vertices the rigid fit is judged by
 
 
+def wrapped(way: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The shortest way on the flat torus that ends where ``way`` does."""
+    return way - np.round(way)
+
+
 @dataclass(frozen=True, eq=False)
 class FlatSurface:
     """A genus-one surface with coordinates on the unit flat torus.
@@ -69,6 +74,13 @@ class FlatSurface:
             sem.step()
         turns = _least_distorted(surface, chart, conformal.lattice, np.ascontiguousarray(turns))
         return cls(surface, conformal.forms, turns)
+
+    @classmethod
+    def at(cls, surface: TriMesh, turns: NDArray[np.float64]) -> FlatSurface:
+        """The surface where ``turns`` (n, 2) puts it, every edge shorter than half a turn."""
+        edges = surface.edges
+        forms = -np.round(turns[edges[:, 1]] - turns[edges[:, 0]]).T
+        return cls(surface, np.ascontiguousarray(forms, np.int32), np.ascontiguousarray(turns))
 
     def changed(self, gauge: Gauge) -> FlatSurface:
         """The same surface in coordinates changed by a gauge."""

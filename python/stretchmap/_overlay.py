@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ._flat import FlatSurface
+from ._flat import FlatSurface, wrapped
 from .mesh import TriMesh
 
 _SAMPLES = 19  # of an edge; the crossings next to them are found
@@ -77,7 +77,7 @@ def _at_crossings(
     sides = np.sort(surface.F[faces][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     edges, index = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
     start = y[edges[:, 0]]
-    way = _wrapped(y[edges[:, 1]] - start)
+    way = wrapped(y[edges[:, 1]] - start)
     samples = np.tile(np.linspace(0.0, 1.0, _SAMPLES), (len(edges), 1))
     found, weights = target.locate(
         (start[:, None] + samples[..., None] * way[:, None]).reshape(-1, 2)
@@ -119,7 +119,7 @@ def _at_target_vertices(
 ) -> Splits:
     """The target vertex farthest from each face it lies in, put on one of the face's edges."""
     F = surface.F
-    home, weights = _flat(surface, y).locator.locate(target.turns)
+    home, weights = FlatSurface.at(surface, y).locator.locate(target.turns)
     inside = np.isin(home, faces) & (weights.min(axis=1) > 1e-9)
     v = np.flatnonzero(inside)
     f, weights = home[v], weights[v]
@@ -130,13 +130,13 @@ def _at_target_vertices(
     order = order[far[order] > exact]
     v, f, weights, far = v[order], f[order], weights[order], far[order]
     # The edge that leaves the largest of the four parts the smallest: the vertex need not be on it.
-    corners = y[F[f, 0]][:, None] + _wrapped(y[F[f]] - y[F[f, :1]])
+    corners = y[F[f, 0]][:, None] + wrapped(y[F[f]] - y[F[f, :1]])
     t = np.einsum("ij,ijk->ik", weights, corners)
     across = _across(F, len(y))[f]
     parts = np.empty((len(v), 3))
     for k in range(3):
         a, b, c = (corners[:, (k + j) % 3] for j in range(3))
-        d = a + _wrapped(y[across[:, k]] - a)
+        d = a + wrapped(y[across[:, k]] - a)
         here = np.minimum(_area(a, t, c), _area(t, b, c)) / _area(a, b, c)
         there = np.minimum(_area(t, a, d), _area(b, t, d)) / _area(b, a, d)
         parts[:, k] = np.minimum(here, there)
@@ -150,12 +150,6 @@ def _at_target_vertices(
     up = np.argsort(ends, axis=1)
     ends, share = np.take_along_axis(ends, up, axis=1), np.take_along_axis(share, up, axis=1)
     return ends, share[:, 1] / share.sum(axis=1), t[rows]
-
-
-def _flat(surface: TriMesh, y: NDArray[np.float64]) -> FlatSurface:
-    edges = surface.edges
-    forms = -np.round(y[edges[:, 1]] - y[edges[:, 0]]).T
-    return FlatSurface(surface, np.ascontiguousarray(forms, np.int32), np.ascontiguousarray(y))
 
 
 def _across(F: NDArray[np.int32], n: int) -> NDArray[np.int32]:
@@ -176,7 +170,3 @@ def _area(
 ) -> NDArray[np.float64]:
     p, q = b - a, c - a
     return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-
-
-def _wrapped(way: NDArray[np.float64]) -> NDArray[np.float64]:
-    return way - np.round(way)
