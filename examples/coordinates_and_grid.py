@@ -8,7 +8,7 @@ import sys
 import numpy as np
 
 import stretchmap as sm
-from stretchmap.resample import hex_mesh
+from stretchmap.resample.hexes import hex_mesh
 from stretchmap.samples import vertebra_like
 
 solid = vertebra_like(12_000)

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 
 import stretchmap as sm
-from stretchmap.morphing import morph
-from stretchmap.resample import transfer
+from stretchmap.plot.morphing import morph
+from stretchmap.resample.fields import transfer
 from stretchmap.samples import vertebra_pair
 
 pair = vertebra_pair(n_landmarks=24, n_tets=(6000, 8000))

@@ -24,7 +24,7 @@ import tables
 
 import stretchmap as sm
 from stretchmap import samples
-from stretchmap.mesh import TetMesh
+from stretchmap.mesh.meshes import TetMesh
 
 DEFAULT = Path(__file__).resolve().parents[3] / "shared" / "meshes"
 

@@ -11,9 +11,9 @@ from typing import Any
 import published
 
 import stretchmap as sm
-from stretchmap.landmarks import landmarks_between
-from stretchmap.mesh import TetMesh
-from stretchmap.resample import hex_mesh
+from stretchmap.mesh.meshes import TetMesh
+from stretchmap.registration.suggest import landmarks_between
+from stretchmap.resample.hexes import hex_mesh
 
 Rows = Iterator[tuple[Any, ...]]
 Meshes = dict[str, TetMesh]

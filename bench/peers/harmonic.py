@@ -28,7 +28,7 @@ from scipy_vsem import Assembly, face_vectors
 import stretchmap as sm
 from stretchmap import _core, samples
 from stretchmap.errors import MissingDependencyError
-from stretchmap.mesh import TetMesh
+from stretchmap.mesh.meshes import TetMesh
 
 _OCTAVE = """
 load (infile);

@@ -28,8 +28,8 @@ from scipy_vsem import face_vectors, minimise
 
 import stretchmap as sm
 from stretchmap import _core, samples
-from stretchmap.mesh import TetMesh
-from stretchmap.vsem import HARMONIC_TOL, step_tolerance
+from stretchmap.mesh.meshes import TetMesh
+from stretchmap.volume.vsem import HARMONIC_TOL, step_tolerance
 
 HERE = Path(__file__).resolve().parent
 FOLDER = Path(os.environ.get("STRETCHMAP_MESHES", HERE.parents[2] / "shared" / "meshes")) / "tets"

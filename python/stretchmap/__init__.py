@@ -6,7 +6,7 @@ import importlib
 import os
 from typing import Any
 
-__version__ = "0.1.0"
+from ._version import __version__
 
 
 def _load_core() -> None:
@@ -30,31 +30,31 @@ _load_core()
 
 # name -> module; loaded on first use so that `import stretchmap` stays fast.
 _EXPORTS = {
-    "TriMesh": "mesh",
-    "TetMesh": "mesh",
+    "TriMesh": "mesh.meshes",
+    "TetMesh": "mesh.meshes",
     "read": "io",
     "write": "io",
-    "Torus": "torus",
-    "homology_basis": "homology",
-    "harmonic_forms": "forms",
-    "holomorphic_forms": "forms",
-    "conformal_map": "conformal",
-    "area_map": "area",
-    "threads": "_threads",
-    "volume_map": "volume",
-    "FlipFreeOptions": "flip_free",
-    "distortion": "measures",
-    "certify": "certificate",
-    "certify_file": "certificate",
-    "load_map": "results",
-    "PointMap": "coordinates",
-    "partition": "partitions",
-    "register": "registration",
-    "Landmarks": "landmarks",
-    "read_landmarks": "landmarks",
-    "hex_mesh": "resample",
-    "transfer": "resample",
-    "morph": "morphing",
+    "Torus": "base.torus",
+    "homology_basis": "homology.basis",
+    "harmonic_forms": "homology.representatives",
+    "holomorphic_forms": "homology.representatives",
+    "conformal_map": "conformal.map",
+    "area_map": "area.map",
+    "threads": "base.threads",
+    "volume_map": "volume.map",
+    "FlipFreeOptions": "volume.options",
+    "distortion": "measures.elements",
+    "certify": "certificate.checks",
+    "certify_file": "certificate.checks",
+    "load_map": "maps.files",
+    "PointMap": "maps.points",
+    "partition": "partitions.parts",
+    "register": "registration.map",
+    "Landmarks": "registration.landmarks",
+    "read_landmarks": "registration.landmarks",
+    "hex_mesh": "resample.hexes",
+    "transfer": "resample.fields",
+    "morph": "plot.morphing",
 }
 _MODULES = {"errors", "samples", "plot"}
 

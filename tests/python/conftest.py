@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stretchmap.mesh import TetMesh, TriMesh
+from stretchmap.mesh.meshes import TetMesh, TriMesh
 
 _ROOT = Path(__file__).resolve().parents[2]
 _MESHES = Path(os.environ.get("STRETCHMAP_MESHES", _ROOT.parent / "shared" / "meshes"))

@@ -22,7 +22,7 @@ import numpy as np
 import stretchmap
 from defect_table import BASES, DEFECTS, Defect
 from stretchmap import TetMesh, TriMesh, errors
-from stretchmap.refine import refine_boundary_joins
+from stretchmap.mesh.refinement import refine_boundary_joins
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from stretchmap.maps.files import LoadedMap
+
 # The six tets of a cube round its diagonal: neighbouring cubes then agree on their common square.
 _KUHN = np.array(
     [
@@ -58,3 +60,11 @@ def torus(nu: int = 12, nv: int = 8) -> tuple[NDArray[np.float64], NDArray[np.in
     p, q, r, s = u * nv + v, i * nv + v, i * nv + j, u * nv + j
     lower, upper = np.stack([p, q, r], -1), np.stack([p, r, s], -1)
     return points, np.stack([lower, upper], axis=2).reshape(-1, 3).astype(np.int32)
+
+
+def a_map(solid, image, torus=None):
+    """A map file's content made of a solid and an image."""
+    return LoadedMap(
+        solid=solid, surface=None, image=image, torus=torus, arrays={}, meta={}, history=(),
+        converged=True, stop_reason="", seconds={},
+    )  # fmt: skip

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit code.
     """
-    from ._guard import guarded
+    from .guard import guarded
 
     given = sys.argv[1:] if arguments is None else list(arguments)
     return guarded(lambda: _run(given))
@@ -54,6 +54,6 @@ def _run(arguments: list[str]) -> object:
         raise MissingDependencyError(
             f"the command line needs {error.name}: pip install 'stretchmap[cli]'"
         ) from None
-    from ._app import application
+    from .app import application
 
-    return application()(args=arguments, prog_name="stretchmap", standalone_mode=False)
+    return application(GROUPS)(args=arguments, prog_name="stretchmap", standalone_mode=False)

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import MeshError, OptionError
-from . import _common as common
-from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet
+from . import common
+from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet
 from .maps import conclude
 
 if TYPE_CHECKING:
-    from ..mesh import TetMesh
-    from ..results import LoadedMap
+    from ..maps.files import LoadedMap
+    from ..mesh.meshes import TetMesh
 
 _log = logging.getLogger("stretchmap")
 
@@ -68,8 +68,8 @@ def register_solids(
 
     Both are solid tori. Volumes keep their shares, no tet is flipped, and the map is certified.
     """
-    from ..progress import terminal
-    from ..registration import register as register_meshes
+    from ..base.progress import terminal
+    from ..registration.map import register as register_meshes
 
     inputs = [path for path in (input, target, landmarks) if path is not None]
     common.check_outputs(output, common.map_suffixes(), json, *inputs)
@@ -109,8 +109,8 @@ def coordinates(
     """
     import numpy as np
 
-    from .._numbers import read_numbers
-    from ..results import atomic_path
+    from ..base.files import atomic_path
+    from ..io.numbers import read_numbers
 
     common.check_output(output, (".csv",), map_file, points)
     result = _solid_map(map_file, "coordinates")
@@ -157,8 +157,8 @@ def partition(
     quiet: Quiet = False,
 ) -> None:
     """Cut a mapped solid into parts by volume."""
-    from ..io import suffixes
-    from ..partitions import partition as cut
+    from ..io.read_write import suffixes
+    from ..partitions.parts import partition as cut
 
     common.check_outputs(output, suffixes(solid=True), json, map_file)
     loaded = _solid_map(map_file, "partition")
@@ -188,8 +188,8 @@ def resample(
 
     The mesh is structured; exit code 1 if a corner Jacobian is not positive.
     """
-    from ..progress import terminal
-    from ..resample import hex_mesh
+    from ..base.progress import terminal
+    from ..resample.hexes import hex_mesh
 
     common.check_outputs(output, (".vtu", ".vtk"), json, map_file)
     result = _solid_map(map_file, "resample")
@@ -217,7 +217,7 @@ def morph(
 
     Every vertex goes the straight way: .pvd with a .vtu per frame, or an animated .gif.
     """
-    from ..morphing import morph as homotopy
+    from ..plot.morphing import morph as homotopy
 
     common.check_output(output, (".pvd", ".gif"), map_file)
     result = homotopy(_solid_map(map_file, "morph"), frames)
@@ -239,7 +239,7 @@ def _solid_torus(path: Path, orient: bool, compact: bool) -> TetMesh:
 
 
 def _solid_map(path: Path, command: str) -> LoadedMap:
-    from ..results import load_map
+    from ..maps.files import load_map
 
     loaded = load_map(path)
     if loaded.solid is None:

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import _common as common
-from ._common import Compact, Input, Json, MapFile, Orient, Output, Quiet, Threads
+from . import common
+from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet, Threads
 
 if TYPE_CHECKING:
-    from ..certificate import Certificate
-    from ..mesh import TetMesh
-    from ..results import LoadedMap, MapResult
+    from ..certificate.findings import Certificate
+    from ..maps.files import LoadedMap
+    from ..maps.result import MapResult
+    from ..mesh.meshes import TetMesh
 
 _log = logging.getLogger("stretchmap")
 
@@ -82,8 +83,8 @@ def conformal(
 
     The surface, or the boundary of the solid given, has genus one.
     """
-    from .._threads import threads as use_threads
-    from ..conformal import conformal_map
+    from ..base.threads import threads as use_threads
+    from ..conformal.map import conformal_map
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
@@ -118,8 +119,8 @@ def area(
 
     The surface, or the boundary of the solid given, has genus one.
     """
-    from ..area import area_map
-    from ..progress import terminal
+    from ..area.map import area_map
+    from ..base.progress import terminal
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
@@ -185,9 +186,9 @@ def volume(
 
     Volumes are preserved, no tet is flipped, and the map is certified to be one to one.
     """
-    from ..progress import terminal
-    from ..results import load_map
-    from ..volume import volume_map
+    from ..base.progress import terminal
+    from ..maps.files import load_map
+    from ..volume.map import volume_map
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
@@ -231,9 +232,9 @@ def certify(
 
     Whoever wrote the file; exit code 1 if it is not.
     """
-    from ..certificate import certify_file
-    from ..results import versions
-    from ..torus import Torus
+    from ..base.tables import versions
+    from ..base.torus import Torus
+    from ..certificate.checks import certify_file
 
     if json is not None:
         common.check_output(json, (json.suffix.lower(),), map_file)
@@ -281,7 +282,7 @@ def conclude(
     result: MapResult, output: Path, json_path: Path | None, quiet: bool, watch: common.Stopwatch
 ) -> None:
     """Certify if that has not been done, write output and report, print the table."""
-    from .._output import table
+    from ..base.tables import table
 
     certificate = getattr(result, "certificate", None)
     if certificate is None:
@@ -304,6 +305,6 @@ def conclude(
 
 
 def _certified(result: MapResult) -> Certificate:
-    from ..certificate import certify
+    from ..certificate.checks import certify
 
     return certify(result.mesh, result.image, result.torus)

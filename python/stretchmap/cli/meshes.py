@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from . import _common as common
-from ._common import Compact, Input, Json, Orient, Output, Quiet
+from . import common
+from .common import Compact, Input, Json, Orient, Output, Quiet
 
 
 def register(app: typer.Typer) -> None:
@@ -26,9 +26,9 @@ def info(
     quiet: Quiet = False,
 ) -> None:
     """Describe a mesh and list every defect."""
+    from ..base.tables import versions
     from ..errors import MeshError
-    from ..mesh import TetMesh
-    from ..results import versions
+    from ..mesh.meshes import TetMesh
 
     if json is not None:
         common.check_output(json, (json.suffix.lower(),), input)
@@ -80,9 +80,9 @@ def homology(
 
     Also generators; of a surface of any genus, or of a solid's boundary.
     """
-    from ..homology import homology_basis
-    from ..mesh import TetMesh
-    from ..results import versions
+    from ..base.tables import versions
+    from ..homology.basis import homology_basis
+    from ..mesh.meshes import TetMesh
 
     if output is not None:
         common.check_outputs(output, (".npz",), json, input)
@@ -123,7 +123,7 @@ def tet(
     """
     from .. import io
     from ..errors import MeshError
-    from ..mesh import TetMesh
+    from ..mesh.meshes import TetMesh
     from ..samples import tetrahedralise
 
     common.check_output(output, io.suffixes(solid=True), input)

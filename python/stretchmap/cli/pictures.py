@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from . import _common as common
-from ._common import Json, MapFile, Output, Quiet
+from . import common
+from .common import Json, MapFile, Output, Quiet
 
 
 class Kind(str, Enum):
@@ -75,8 +75,8 @@ def plot(
     sectors of equal volume. registration: source and target with landmarks. loops: handle and
     tunnel. domain: the boundary in its angles. ratios: histograms. convergence: the iterations.
     """
+    from ..maps.files import load_map
     from ..plot import picture, save
-    from ..results import load_map
 
     common.check_output(output, (".png", ".pdf", ".svg"), map_file)
     common.require_package("matplotlib", "drawing", "plot")
@@ -90,8 +90,8 @@ def report(map_file: MapFile, output: Output) -> None:
 
     One file with figures, certificate and pictures; nothing is fetched.
     """
-    from ..report import write_report
-    from ..results import load_map
+    from ..maps.files import load_map
+    from ..plot.report import write_report
 
     common.check_output(output, (".html", ".htm"), map_file)
     common.require_package("matplotlib", "drawing", "plot")
@@ -112,8 +112,8 @@ def demo(
     Needs no data.
     """
     from .. import plot, samples
-    from ..progress import terminal
-    from ..volume import volume_map
+    from ..base.progress import terminal
+    from ..volume.map import volume_map
     from .maps import conclude
 
     common.require_package("matplotlib", "the demo's pictures", "plot")

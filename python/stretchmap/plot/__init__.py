@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileFormatError, OptionError
-from ..mesh import TetMesh
-from ..results import MapResult
+from ..maps.result import MapResult
+from ..mesh.meshes import TetMesh
 from .pairs import registration
 from .solids import cutaway, levels
 from .statistics import convergence, ratios
@@ -115,7 +115,7 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> No
     OSError
         The file cannot be written.
     """
-    from ..results import atomic_path
+    from ..base.files import atomic_path
 
     path = Path(path)
     if path.suffix.lower() not in (".png", ".pdf", ".svg"):

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import OptionError
-from ..mesh import TetMesh
-from ..results import MapResult
-from ._painting import Array, Scene, View
-from ._style import BLACK, along, broad_view, empty_figure
+from ..maps.result import MapResult
+from ..mesh.meshes import TetMesh
+from .painting import Array, Scene, View
+from .style import BLACK, along, broad_view, empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +53,7 @@ def registration(result: MapResult) -> Figure:
     figure = empty_figure(9.6, 8.4)
     from matplotlib.lines import Line2D
 
-    from ..landmarks import Landmarks, similarity
+    from ..registration.landmarks import Landmarks, similarity
 
     image = np.asarray(result.image)
     skin, ids = solid.surface, solid.boundary_vertices

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.torus import TWO_PI
 from ..errors import ArrayError, OptionError
-from ..mesh import TetMesh
-from ..results import MapResult
-from ..torus import TWO_PI
-from ._painting import Array, Scene, View
-from ._style import along, broad_view, cividis, colour_bar, empty_figure, frame, steps
+from ..maps.result import MapResult
+from ..mesh.meshes import TetMesh
+from .painting import Array, Scene, View
+from .style import along, broad_view, cividis, colour_bar, empty_figure, frame, steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -118,7 +118,7 @@ def levels(
     MissingDependencyError
         matplotlib is not installed.
     """
-    from ..partitions import partition
+    from ..partitions.parts import partition
 
     if by not in ("s", "u", "v") or not 0.0 <= opening < 1.0:
         raise OptionError("by must be 's', 'u' or 'v' and 0 <= opening < 1")

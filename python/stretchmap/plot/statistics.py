@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import OptionError
-from ..mesh import TetMesh
-from ..results import MapResult
-from ._painting import Array
-from ._style import BLACK, BLUE, GREY, ORANGE, empty_figure, steps
+from ..maps.result import MapResult
+from ..mesh.meshes import TetMesh
+from .painting import Array
+from .style import BLACK, BLUE, GREY, ORANGE, empty_figure, steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,8 +129,8 @@ def convergence(result: MapResult) -> Figure:
 def ratios_before(result: MapResult) -> tuple[Array, str]:
     """Ratios of the map one would have without preserving anything, and its name."""
     from .. import _core
-    from ..conformal import conformal_map
-    from ..vsem import minimise_volumetric_stretch
+    from ..conformal.map import conformal_map
+    from ..volume.vsem import minimise_volumetric_stretch
 
     mesh = result.mesh
     if not isinstance(mesh, TetMesh):

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import OptionError
-from ..mesh import TetMesh, TriMesh
-from ..results import MapResult, corner_turns
-from ._painting import Array, Scene, View, subdivided
-from ._style import (
+from ..maps.result import MapResult, corner_turns
+from ..mesh.meshes import TetMesh, TriMesh
+from .painting import Array, Scene, View, subdivided
+from .style import (
     BLUE,
     LIGHT_GREY,
     VERMILION,
@@ -157,7 +157,7 @@ def loops(result: MapResult | TriMesh | TetMesh) -> Figure:
     figure = empty_figure(6.4, 4.8)
     from matplotlib.lines import Line2D
 
-    from ..homology import homology_basis
+    from ..homology.basis import homology_basis
 
     mesh = result.mesh if isinstance(result, MapResult) else result
     solid = mesh if isinstance(mesh, TetMesh) else None

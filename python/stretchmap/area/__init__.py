@@ -1,0 +1,1 @@
+"""The area-preserving map of a genus-one surface (Algorithm 4.1)."""

@@ -1,0 +1,264 @@
+"""Area-preserving map of a genus-one surface onto a torus of revolution, Algorithm 4.1."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.arrays import read_only
+from ..base.progress import Progress
+from ..base.threads import takes_threads
+from ..base.torus import Torus
+from ..conformal.map import ConformalMap, conformal_map
+from ..errors import OptionError
+from ..maps.history import IterationRecord
+from ..maps.result import MapResult
+from ..measures.elements import Distortion, distortion
+from .finish import finish_areas
+from .search import search_phase
+from .sem import minimise_stretch, start_angles
+
+if TYPE_CHECKING:
+    from ..homology.basis import HomologyBasis
+    from ..mesh.meshes import TriMesh
+
+__all__ = ["AreaMap", "area_map"]
+
+_log = logging.getLogger("stretchmap")
+
+
+@dataclass(frozen=True, eq=False)
+class AreaMap(MapResult):
+    """An area-preserving map onto a torus of revolution.
+
+    Attributes
+    ----------
+    surface : TriMesh
+        The source.
+    angles : ndarray, shape (n, 2)
+        Angles (u, v) of the image in radians, not reduced to one turn: ``2 pi forms + d angles`` is
+        the change along an edge. They do not depend on the size of the torus.
+    image : ndarray, shape (n, 3)
+        Points on ``torus``.
+    torus : Torus
+        Torus with the surface's area and the ratio of radii in ``ratio``.
+    phase : float
+        Turns of the equal-area coordinate around the tube that were added to the conformal map's.
+    ratio : float
+        ``R / r`` of the torus.
+    forms : ndarray, shape (2, e), int32
+        Integer closed 1-forms of u and v, as in `ConformalMap`.
+    history : tuple of IterationRecord
+        One record per iteration: stage ``"sem"`` measured in the equal-area chart, its energy E_S
+        (4.1) of shares, at least 1; stage ``"newton"`` on the polyhedral image, its energy that of
+        the finishing solve over the weight of its area term. Within a stage the energy never rises.
+    distortion : Distortion
+        Of the polyhedral image; a face is flipped where it is negative in the (u, v) chart.
+    converged : bool
+    stop_reason : str
+    seconds : dict
+        Wall-clock time per stage.
+    """
+
+    title = "area"
+
+    surface: TriMesh
+    angles: NDArray[np.float64]
+    image: NDArray[np.float64]
+    torus: Torus
+    phase: float
+    ratio: float
+    forms: NDArray[np.int32] = field(repr=False)
+    history: tuple[IterationRecord, ...] = field(repr=False)
+    distortion: Distortion
+    converged: bool
+    stop_reason: str
+    seconds: Mapping[str, float]
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """``angles`` (n, 2) and ``forms`` (2, e)."""
+        return {"angles": self.angles, "forms": self.forms}
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """``phase`` and ``ratio``."""
+        return {"phase": self.phase, "ratio": self.ratio}
+
+    def image_on(self, torus: Torus) -> NDArray[np.float64]:
+        """The same map on a torus of another size, (n, 3).
+
+        Raises
+        ------
+        OptionError
+            If the torus has another ratio of radii: the map would not preserve areas there.
+        """
+        if not math.isclose(torus.ratio, self.ratio, rel_tol=1e-9):
+            raise OptionError(f"the map is for R / r = {self.ratio}, the torus has {torus.ratio}")
+        return torus.xi(self.angles[:, 0], self.angles[:, 1])
+
+
+@takes_threads
+def area_map(
+    surface: TriMesh,
+    *,
+    basis: HomologyBasis | None = None,
+    conformal: ConformalMap | None = None,
+    torus: Torus | None = None,
+    phase: float | None = None,
+    ratio: str | float = "conformal",
+    finish: str = "ring",
+    max_iter: int = 30,
+    tol: float = 5e-3,
+    shape_budget: float = 1.2,
+    sem_iter: int = 10,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> AreaMap:
+    """Map a genus-one surface onto a torus of revolution so that areas are preserved.
+
+    Stretch energy minimisation (Algorithm 4.1) in the equal-area chart of the torus; the phase
+    around the tube by a search; then Newton steps on the areas of the polyhedral image, vertices
+    gliding on the torus, no face ever turned over.
+
+    Parameters
+    ----------
+    surface : TriMesh
+        Closed surface of genus one.
+    basis : HomologyBasis, optional
+        From `homology_basis`; computed if left out.
+    conformal : ConformalMap, optional
+        From `conformal_map`; computed if left out.
+    torus : Torus, optional
+        Torus to map onto, with its size and ratio of radii. Left out, it has the surface's area.
+    phase : float, optional
+        Turns to add to the equal-area coordinate around the tube; searched if left out.
+    ratio : "conformal", "search" or float
+        ``R / r``: that of the conformal map, the best found by a search, or given (above 1). Not
+        together with ``torus``.
+    finish : "ring", "face" or "none"
+        ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then a
+        projection that makes the area of every vertex ring exact, kept if the faces stay within
+        ``tol`` or do not get worse. ``"none"``: the chart's map as it is.
+    max_iter : int
+        Most Newton steps.
+    tol : float
+        Goal for the standard deviation of the face ratios; none is to be off by more than 10 times
+        that.
+    shape_budget : float
+        Once the face SD is below 4 ``tol``, the Newton steps end where the mean angle distortion
+        exceeds the least seen by this factor: on regular triangulations the last per cent of area
+        is paid for with needles.
+    sem_iter : int
+        Most steps of stretch energy minimisation.
+    threads : int, optional
+        Threads to use, see `threads`; the result does not depend on it.
+    progress : Progress, optional
+        Called once per step.
+
+    Returns
+    -------
+    AreaMap
+        ``converged`` is False, and a warning logged, if ``tol`` was not reached.
+
+    Raises
+    ------
+    OptionError
+        An option out of range.
+    SolverError
+        No start without flipped faces was found; ``ids`` are the faces.
+    GenusError, MeshError
+        As `conformal_map`.
+
+    Notes
+    -----
+    The finishing solve minimises, over the angles of all vertices,
+    ``sum |t| [rho + 1/rho - 2 + (shape Q + chart (sigma + 1/sigma - 2)) / weight]``: rho a face's
+    area ratio in space, Q = (s1/s2 + s2/s1)/2 - 1 its angle distortion, sigma its area ratio in the
+    chart, which is infinite before a face turns over. The weight grows from step to step.
+    """
+    _check_options(torus, phase, ratio, finish)
+    _check_numbers(max_iter, tol, shape_budget, sem_iter)
+    clock = time.perf_counter()
+    seconds: dict[str, float] = {}
+    if conformal is None:
+        conformal = conformal_map(surface, basis)
+    clock = _lap(seconds, "conformal", clock)
+
+    chart = _core.SurfaceChart(surface.topology, conformal.forms)
+    turns, history = minimise_stretch(surface, chart, conformal, sem_iter, progress)
+    clock = _lap(seconds, "sem", clock)
+
+    wanted = ratio if torus is None else torus.ratio
+    phase, ratio = search_phase(surface, turns, conformal.aspect, phase, wanted)
+    angles = start_angles(chart, turns, phase, ratio)
+    clock = _lap(seconds, "phase", clock)
+
+    records, converged, reason = [], True, "stretch energy at rest"
+    if finish != "none":
+        problem = _core.GlideProblem(chart, _core.SurfaceReference(surface.V, surface.F), ratio)
+        newton = _core.SurfaceNewton(problem, angles)
+        records, converged, reason = finish_areas(
+            newton, finish == "ring", max_iter, tol, shape_budget, progress
+        )
+        angles = newton.angles
+    history += records
+    _lap(seconds, "finish", clock)
+
+    if torus is None:
+        torus = Torus.from_ratio(ratio, area=surface.area)
+    image = torus.xi(angles[:, 0], angles[:, 1])
+    if not converged:
+        _log.warning("area map: %s", reason)
+    return AreaMap(
+        surface=surface,
+        angles=read_only(angles),
+        image=read_only(image),
+        torus=torus,
+        phase=phase,
+        ratio=ratio,
+        forms=conformal.forms,
+        history=tuple(history),
+        distortion=distortion(surface, image, angles=angles),
+        converged=converged,
+        stop_reason=reason,
+        seconds=seconds,
+    )
+
+
+def _check_options(
+    torus: Torus | None, phase: float | None, ratio: str | float, finish: str
+) -> None:
+    if phase is not None and not math.isfinite(phase):
+        raise OptionError(f"phase must be finite, got {phase}")
+    if torus is not None and ratio != "conformal":
+        raise OptionError("give the torus or the ratio of its radii, not both")
+    if isinstance(ratio, str):
+        if ratio not in ("conformal", "search"):
+            raise OptionError(f"ratio must be 'conformal', 'search' or a number, got {ratio!r}")
+    elif not (math.isfinite(ratio) and ratio > 1.0):
+        raise OptionError(f"ratio R / r must be above 1 and finite, got {ratio}")
+    if finish not in ("ring", "face", "none"):
+        raise OptionError(f"finish must be 'ring', 'face' or 'none', got {finish!r}")
+
+
+def _check_numbers(max_iter: int, tol: float, shape_budget: float, sem_iter: int) -> None:
+    if not (math.isfinite(tol) and tol > 0.0):
+        raise OptionError(f"tol must be positive, got {tol}")
+    if not shape_budget >= 1.0:
+        raise OptionError(f"shape_budget must be at least 1, got {shape_budget}")
+    for name, value in (("max_iter", max_iter), ("sem_iter", sem_iter)):
+        if value < 0:
+            raise OptionError(f"{name} must not be negative, got {value}")
+
+
+def _lap(seconds: dict[str, float], stage: str, start: float) -> float:
+    now = time.perf_counter()
+    seconds[stage] = now - start
+    return now

@@ -1,0 +1,65 @@
+"""The search for the phase round the tube, and for R / r."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..conformal.torus import conformal_torus
+
+if TYPE_CHECKING:
+    from ..mesh.meshes import TriMesh
+_SAMPLE = 6000  # faces that suffice for the search
+
+_PHASES = 36  # first round of the search around the tube
+_RATIOS = (1.25, 1.5, 2.0, 2.5, 3.2, 4.0, 6.0, 10.0)  # first round of the search for R / r
+
+
+def search_phase(
+    surface: TriMesh,
+    turns: NDArray[np.float64],
+    aspect: float,
+    phase: float | None,
+    ratio: str | float,
+) -> tuple[float, float]:
+    """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image."""
+    sample = surface.F[:: -(-len(surface.F) // _SAMPLE)]
+    used, faces = np.unique(sample, return_inverse=True)
+    faces = faces.reshape(sample.shape).astype(np.int32)
+    reference = _core.SurfaceReference(surface.V[used], faces)
+    turns = turns[used]
+    phases = np.arange(_PHASES) / _PHASES if phase is None else np.array([float(phase)])
+    conformal = conformal_torus(aspect).ratio
+    if ratio == "search":
+        ratios = np.array([conformal, *_RATIOS])
+    else:
+        ratios = np.array([conformal if ratio == "conformal" else float(ratio)])
+    width = np.array([0.0 if phase is not None else 1.0 / _PHASES, 0.2 * (len(ratios) > 1)])
+    candidates = np.array([(p, r) for r in ratios for p in phases])
+    best = _best(reference, faces, turns, candidates)
+    while width.max() > 0.01:
+        width *= 0.5
+        offsets = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]) * width
+        candidates = np.unique(
+            np.column_stack(
+                [best[0] + offsets[:, 0], 1.0 + (best[1] - 1.0) * np.exp(offsets[:, 1])]
+            ),
+            axis=0,
+        )
+        best = _best(reference, faces, turns, candidates)
+    return float(best[0] if phase is not None else best[0] % 1.0), float(best[1])
+
+
+def _best(
+    reference: _core.SurfaceReference,
+    faces: NDArray[np.int32],
+    turns: NDArray[np.float64],
+    candidates: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    if len(candidates) == 1:
+        return candidates[0]
+    qualities = _core.phase_qualities(reference, faces, turns, candidates)
+    return candidates[int(np.argmin([quality.energy for quality in qualities]))]

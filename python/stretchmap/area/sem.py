@@ -1,0 +1,77 @@
+"""Stretch energy minimisation, Algorithm 4.1, in the equal-area chart."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.progress import Progress, report
+from ..base.torus import TWO_PI
+from ..conformal.map import ConformalMap
+from ..maps.history import IterationRecord
+
+if TYPE_CHECKING:
+    from ..mesh.meshes import TriMesh
+
+
+def minimise_stretch(
+    surface: TriMesh,
+    chart: _core.SurfaceChart,
+    conformal: ConformalMap,
+    max_iter: int,
+    progress: Progress | None,
+) -> tuple[NDArray[np.float64], list[IterationRecord]]:
+    """Steps of (4.5) in the chart until the energy is at its bound or stops falling."""
+    start = time.perf_counter()
+    turns = conformal.turns
+    if (_core.turn_areas(chart, turns) <= 0.0).any():
+        # Positive weights embed the surface in a flat torus whatever its triangles (Tutte).
+        weights = np.ones(len(surface.edges))
+        forms = conformal.forms.astype(float)
+        turns = _core.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
+    sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, turns)
+    history: list[IterationRecord] = []
+    taken = None
+    for iteration in range(max_iter + 1):
+        if iteration:
+            taken = sem.step()
+        figures = sem.figures()
+        history.append(
+            IterationRecord(
+                stage="sem",
+                iteration=iteration,
+                energy=figures.energy,
+                step=math.nan if taken is None else taken.step,
+                residual=math.nan if taken is None else taken.residual,
+                flips=figures.flips,
+                ring_sd=figures.ring_sd,
+                element_sd=figures.face_sd,
+                seconds=time.perf_counter() - start,
+            )
+        )
+        report(progress, "area", iteration, max_iter, energy=figures.energy, flips=figures.flips)
+        if iteration and history[-2].energy - figures.energy <= 1e-4 * figures.energy:
+            break
+    return sem.turns, history
+
+
+def start_angles(
+    chart: _core.SurfaceChart, turns: NDArray[np.float64], phase: float, ratio: float
+) -> NDArray[np.float64]:
+    """(u, v) in radians from (u, s) in turns, without flipped faces where there are none in (u, s).
+
+    Large faces can turn over when s is bent into v. Then it is bent less: v = s turns none.
+    """
+    s = TWO_PI * (turns[:, 1] + phase)
+    bend = 1.0 / ratio
+    while True:
+        v = _core.angle_from_equal_area(s, bend)
+        bent = np.column_stack([turns[:, 0], v / TWO_PI])
+        if bend == 0.0 or (_core.turn_areas(chart, bent) > 0.0).all():
+            return np.column_stack([TWO_PI * turns[:, 0], v])
+        bend = 0.8 * bend if bend > 0.01 else 0.0

@@ -1,0 +1,1 @@
+"""What every other room stands on: arrays, the torus, threads, progress, tables, files."""

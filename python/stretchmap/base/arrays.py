@@ -1,0 +1,140 @@
+"""Conversion of user arrays at the edge: accepted once, checked once, read-only afterwards."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ArrayError, IndexRangeError, NonFiniteError
+
+INT32_MAX = np.iinfo(np.int32).max
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return ``array`` itself, marked as not writable."""
+    array.flags.writeable = False
+    return array
+
+
+def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
+    """Convert points to a read-only C-ordered copy.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like of real numbers
+    name : str
+        What the caller names the array, for messages.
+
+    Returns
+    -------
+    (n, 3) ndarray of float64
+
+    Raises
+    ------
+    ArrayError
+        Not a real (n, 3) array with at least one row.
+    NonFiniteError
+        A NaN or an infinity; ``ids`` are the rows.
+    """
+    raw = _as_array(points, name)
+    if raw.dtype.kind not in "fiu":
+        raise ArrayError(f"{name} must hold real numbers, not {raw.dtype}")
+    _check_shape(raw, name, 3, "points")
+    copy = np.array(raw, dtype=np.float64, order="C")
+    if len(copy) > INT32_MAX:
+        raise ArrayError(f"{name} has {len(copy)} rows; at most {INT32_MAX} can be indexed")
+    bad = np.flatnonzero(~np.isfinite(copy).all(axis=1))
+    if len(bad):
+        raise NonFiniteError(
+            f"{name} has NaN or infinite coordinates at {describe('vertex', bad)}; "
+            "replace or remove those vertices",
+            bad,
+        )
+    return read_only(copy)
+
+
+def as_indices(indices: ArrayLike, width: int, n: int, name: str = "F") -> NDArray[np.int32]:
+    """Convert element indices to a read-only C-ordered copy.
+
+    Parameters
+    ----------
+    indices : (m, width) array_like of integers
+        Any integer type, byte order and memory order.
+    width : int
+        Vertices per element: 3 or 4.
+    n : int
+        Number of vertices; every index has to lie in ``[0, n)``.
+    name : str
+        What the caller names the array, for messages.
+
+    Returns
+    -------
+    (m, width) ndarray of int32
+
+    Raises
+    ------
+    ArrayError
+        Not an integer (m, width) array with at least one row, or too many elements.
+    IndexRangeError
+        An index outside ``[0, n)``; ``ids`` are the rows.
+    """
+    raw = _as_array(indices, name)
+    if raw.dtype.kind not in "iu":
+        hint = f"; convert with {name}.astype(int)" if raw.dtype.kind == "f" else ""
+        raise ArrayError(f"{name} must hold integers, not {raw.dtype}{hint}")
+    element = {3: "face", 4: "tet"}[width]
+    _check_shape(raw, name, width, f"{element}s")
+    if len(raw) > INT32_MAX // (2 * width):
+        raise ArrayError(f"{name} has {len(raw)} rows, more than 32-bit ids can number")
+    bad = np.flatnonzero(((raw < 0) | (raw >= n)).any(axis=1))
+    if len(bad):
+        low, high = int(raw.min()), int(raw.max())
+        hint = "; the indices look 1-based, subtract 1" if low == 1 and high == n else ""
+        raise IndexRangeError(
+            f"{name} points outside V at {describe(element, bad)}: indices run from {low} to "
+            f"{high}, allowed are 0 to {n - 1}{hint}",
+            bad,
+        )
+    return read_only(np.array(raw, dtype=np.int32, order="C"))
+
+
+def describe(what: str, ids: ArrayLike, limit: int = 5) -> str:
+    """Name a few ids: ``'vertex 7'`` or ``'12 faces (0, 3, 4, 9, 11, ...)'``."""
+    rows = np.asarray(ids).tolist()
+    rows = [tuple(row) if isinstance(row, list) else row for row in rows]
+    if len(rows) == 1:
+        return f"{what} {rows[0]}"
+    plural = {"vertex": "vertices"}.get(what, what + "s")
+    tail = ", ..." if len(rows) > limit else ""
+    return f"{len(rows)} {plural} ({', '.join(str(row) for row in rows[:limit])}{tail})"
+
+
+def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
+    if np.ma.is_masked(values):
+        raise ArrayError(f"{name} is a masked array with masked entries; fill or drop them")
+    try:
+        raw = np.asarray(values)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise ArrayError(f"{name} is not a rectangular array of numbers: {error}") from error
+    return raw
+
+
+def _check_shape(raw: NDArray[Any], name: str, width: int, what: str) -> None:
+    expected = f"{name} must have shape (number of {what}, {width}), not {raw.shape}"
+    if raw.ndim != 2:
+        raise ArrayError(expected)
+    if raw.shape[1] != width:
+        hint = ""
+        if raw.shape[0] == width:
+            hint = f"; it looks transposed, pass {name}.T"
+        elif what == "points" and raw.shape[1] == 2:
+            hint = "; add a column of zeros to planar points"
+        elif what == "faces" and raw.shape[1] == 4:
+            hint = "; tets belong into a TetMesh, quads have to be split into triangles"
+        elif what == "tets" and raw.shape[1] == 3:
+            hint = "; triangles belong into a TriMesh"
+        raise ArrayError(expected + hint)
+    if len(raw) == 0:
+        raise ArrayError(f"{name} is empty, there is no mesh without {what}")

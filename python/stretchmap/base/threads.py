@@ -1,0 +1,69 @@
+"""How many threads the core uses."""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import ParamSpec, TypeVar
+
+from .. import _core
+from ..errors import OptionError
+
+__all__ = ["takes_threads", "threads"]
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+
+@contextmanager
+def threads(count: int | None) -> Iterator[None]:
+    """Let everything inside a ``with`` block use this many threads.
+
+    The number belongs to the calling Python thread, others keep theirs; afterwards it is what it
+    was. Results do not depend on it, to the last bit.
+
+    Parameters
+    ----------
+    count : int or None
+        At least 1. None leaves the number as it is: that of ``OMP_NUM_THREADS``, else one per
+        processor.
+
+    Raises
+    ------
+    OptionError
+        ``count`` is no positive integer.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> with sm.threads(1):
+    ...     result = sm.area_map(sm.samples.torus_surface(24, 12))
+    """
+    if count is None:
+        yield
+        return
+    try:
+        wanted = operator.index(count)
+    except TypeError:
+        raise OptionError(f"threads must be an integer, got {count!r}") from None
+    if not 1 <= wanted <= 1024:
+        raise OptionError(f"threads must be between 1 and 1024, got {wanted}")
+    before = _core.thread_count()
+    _core.set_thread_count(wanted)
+    try:
+        yield
+    finally:
+        _core.set_thread_count(before)
+
+
+def takes_threads(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Run a function that has a keyword ``threads`` with that many of them."""
+
+    @functools.wraps(function)
+    def run(*args: _Arguments.args, **keywords: _Arguments.kwargs) -> _Result:
+        with threads(keywords.get("threads")):  # type: ignore[arg-type]
+            return function(*args, **keywords)
+
+    return run

@@ -1,0 +1,1 @@
+"""Proofs that a map is one to one."""

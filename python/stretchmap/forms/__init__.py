@@ -1,0 +1,1 @@
+"""Harmonic and holomorphic one-forms of a surface."""

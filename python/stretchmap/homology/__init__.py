@@ -1,0 +1,1 @@
+"""Loops of a surface: homology basis, handle and tunnel loops, integer arithmetic."""

@@ -1,0 +1,327 @@
+"""Homology of a surface: generators, dual 1-forms, handle and tunnel loops (paper section 3.1).
+
+The *meridian* of a torus bounds a disk inside the solid, the *longitude* runs the long way round.
+Which is which is a matter of linking numbers, or of the solid when it is given, never of length.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.arrays import read_only
+from ..base.files import atomic_path
+from ..base.tables import table
+from ..errors import ArrayError, GenusError, SelfIntersectionError
+from ..forms.harmonic import HarmonicForms, solve_harmonic
+from ..io.npz import save_npz
+from .bounding import bounding_by_linking, bounding_in, least_skew_longitude, same_lattice
+from .integer import integer_inverse, reduced_basis
+
+if TYPE_CHECKING:
+    from ..mesh.meshes import TetMesh, TriMesh
+
+__all__ = ["HomologyBasis", "homology_basis"]
+
+logger = logging.getLogger("stretchmap")
+
+
+@dataclass(frozen=True, eq=False)
+class HomologyBasis:
+    """Generators of the first homology of a closed surface and what the embedding says of them.
+
+    A loop is an array of vertex ids, the first not repeated at the end. A class is an integer row
+    of coefficients over ``generators``. Loops other than the generators are found on first use.
+
+    Attributes
+    ----------
+    surface : TriMesh
+    genus : int
+    generators : tuple of ndarray
+        2g simple loops, a basis of H1 over the integers.
+    dual_forms : ndarray, shape (2g, e), int32
+        Closed integer 1-forms; form i has period exactly ``i == j`` over generator j, (3.1).
+    intersection : ndarray, shape (2g, 2g), int64
+        Intersection numbers of the generators.
+    linking : ndarray, shape (2g, 2g), int64, or None
+        Entry (i, j): linking number of generator i with generator j lifted outward. None when the
+        surface crosses itself (possible only if the solid was given).
+    handle_classes : ndarray, shape (g, 2g), int64
+        Basis of the classes that bound inside, of least extremal length first.
+    tunnel_classes : ndarray, shape (g, 2g), int64, or None
+        Basis of the classes that bound outside; tunnel i meets handle i once and no other. None
+        where ``linking`` is.
+    harmonic : HarmonicForms
+        Harmonic representatives of ``dual_forms`` in cotangent weights.
+    torus_classes : ndarray, shape (2, 2), int64, or None
+        Genus one only: classes of the longitude (row 0) and of the meridian (row 1). Of the
+        longitudes, which differ by meridians, the one that makes the flat torus least skew.
+    torus_matrix : ndarray, shape (2, 2), int64, or None
+        ``torus_forms = torus_matrix @ dual_forms``.
+    torus_forms : ndarray, shape (2, e), int32, or None
+        Row 0 has period 1 on the longitude and 0 on the meridian, row 1 the other way round; the
+        integral of row 0 wedge row 1 over the outward surface is +1.
+    """
+
+    surface: TriMesh = field(repr=False)
+    genus: int
+    generators: tuple[NDArray[np.int32], ...] = field(repr=False)
+    dual_forms: NDArray[np.int32] = field(repr=False)
+    intersection: NDArray[np.int64]
+    linking: NDArray[np.int64] | None
+    handle_classes: NDArray[np.int64]
+    tunnel_classes: NDArray[np.int64] | None
+    harmonic: HarmonicForms = field(repr=False)
+    torus_classes: NDArray[np.int64] | None
+    torus_matrix: NDArray[np.int64] | None
+    torus_forms: NDArray[np.int32] | None = field(repr=False)
+
+    @cached_property
+    def handle_loops(self) -> tuple[NDArray[np.int32], ...]:
+        """Shortest loop of edges in each handle class: g loops that bound inside."""
+        return tuple(self.shortest_loop(c) for c in self.handle_classes)
+
+    @cached_property
+    def tunnel_loops(self) -> tuple[NDArray[np.int32], ...]:
+        """Shortest loop of edges in each tunnel class: g loops that bound outside.
+
+        Raises
+        ------
+        SelfIntersectionError
+            The surface crosses itself; there is no outside.
+        """
+        if self.tunnel_classes is None:
+            raise SelfIntersectionError(
+                "the surface crosses itself: which loops bound outside it is not defined"
+            )
+        return tuple(self._shortest_loop(c, self.handle_loops) for c in self.tunnel_classes)
+
+    @property
+    def meridian(self) -> NDArray[np.int32]:
+        """Shortest loop of the meridian's class.
+
+        Raises
+        ------
+        GenusError
+            The genus is not one.
+        """
+        self.require_torus()
+        return self.handle_loops[0]
+
+    @cached_property
+    def longitude(self) -> NDArray[np.int32]:
+        """Shortest loop of the longitude's class.
+
+        Raises
+        ------
+        GenusError
+            The genus is not one.
+        """
+        self.require_torus()
+        if np.array_equal(self.torus_classes[:1], self.tunnel_classes):
+            return self.tunnel_loops[0]
+        return self._shortest_loop(self.torus_classes[0], self.handle_loops)
+
+    def shortest_loop(self, coefficients: NDArray[np.int64]) -> NDArray[np.int32]:
+        """Shortest loop of edges in a homology class.
+
+        Parameters
+        ----------
+        coefficients : (2g,) array of int
+            The class over ``generators``, not zero.
+
+        Returns
+        -------
+        (k,) ndarray of int32
+            Vertex ids. The loop is exactly shortest, but it is a walk: in a class that no simple
+            loop represents it meets itself.
+
+        Raises
+        ------
+        ArrayError
+            The class is zero or has the wrong length.
+        """
+        coefficients = np.asarray(coefficients)
+        if coefficients.shape != (2 * self.genus,) or not coefficients.any():
+            raise ArrayError(f"a class is {2 * self.genus} integers, not all zero")
+        return self._shortest_loop(coefficients, ())
+
+    def _shortest_loop(
+        self, target: NDArray[np.int64], known: tuple[NDArray[np.int32], ...]
+    ) -> NDArray[np.int32]:
+        top = self.surface.topology
+        lengths = _core.edge_lengths(top, self.surface.V)
+        crossing = [
+            loop
+            for loop in (*known, *self.generators)
+            if _core.periods(top, self.dual_forms, loop) @ self.intersection @ target
+        ]
+        loop = _core.shortest_loop(
+            top, lengths, self.dual_forms, target.astype(np.int32), min(crossing, key=len)
+        )
+        return read_only(np.array(loop, dtype=np.int32))
+
+    def length(self, loop: NDArray[np.int32]) -> float:
+        """Length of a closed polygon through vertices of the surface, in units of ``V``."""
+        points = self.surface.V[np.asarray(loop)]
+        return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
+
+    def classes(self, loop: NDArray[np.int32]) -> NDArray[np.int64]:
+        """Class (2g,) of a loop of edges over ``generators``: its periods, exact.
+
+        Raises
+        ------
+        ArrayError
+            Two consecutive vertices are not joined by an edge.
+        """
+        return _core.periods(self.surface.topology, self.dual_forms, loop).astype(np.int64)
+
+    def require_torus(self) -> None:
+        """Check that the genus is one.
+
+        Raises
+        ------
+        GenusError
+            If it is not.
+        """
+        if self.genus != 1:
+            raise GenusError(
+                f"a torus map needs a surface of genus 1, this one has genus {self.genus}; loops "
+                "and holomorphic forms work for any genus"
+            )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Genus and loop lengths, JSON-compatible."""
+        rows: dict[str, Any] = {
+            "genus": self.genus,
+            "n_vertices": self.surface.n_vertices,
+            "n_faces": self.surface.n_faces,
+            "handle_lengths": [self.length(loop) for loop in self.handle_loops],
+        }
+        if self.tunnel_classes is not None:
+            rows["tunnel_lengths"] = [self.length(loop) for loop in self.tunnel_loops]
+        if self.genus == 1:
+            rows["meridian_length"] = self.length(self.meridian)
+            rows["longitude_length"] = self.length(self.longitude)
+        return rows
+
+    def summary(self) -> str:
+        """A table of genus and loop lengths."""
+        rows = self.to_dict()
+        for name in ("handle_lengths", "tunnel_lengths"):
+            if name in rows:
+                rows[name] = ", ".join(f"{x:.6g}" for x in rows[name])
+        return table(rows)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write loops and forms to an ``.npz`` file.
+
+        Parameters
+        ----------
+        path : path-like
+            Gets ``V``, ``F``, ``edges``, ``dual_forms``, the loops ``generator_0``, ...,
+            ``handle_0``, ..., ``tunnel_0``, ... and, for genus one, ``meridian``, ``longitude`` and
+            ``torus_forms``.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
+        arrays = {"V": self.surface.V, "F": self.surface.F, "edges": self.surface.edges}
+        arrays["dual_forms"] = self.dual_forms
+        families = {"generator": self.generators, "handle": self.handle_loops}
+        if self.tunnel_classes is not None:
+            families["tunnel"] = self.tunnel_loops
+        for name, loops in families.items():
+            arrays.update({f"{name}_{i}": loop for i, loop in enumerate(loops)})
+        if self.torus_forms is not None:
+            arrays.update(meridian=self.meridian, longitude=self.longitude)
+            arrays["torus_forms"] = self.torus_forms
+        with atomic_path(path) as temporary, open(temporary, "wb") as file:
+            save_npz(file, arrays)
+
+
+def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBasis:
+    """Generators, dual forms, and handle and tunnel classes of a closed surface of any genus.
+
+    Parameters
+    ----------
+    surface : TriMesh
+        Closed, connected, faces outward; embedded unless the solid is given.
+    solid : TetMesh, optional
+        The solid with ``solid.surface`` equal to ``surface``. Then the handle classes are those
+        that bound in it (its first cohomology decides), and linking numbers only say which classes
+        bound outside.
+
+    Returns
+    -------
+    HomologyBasis
+
+    Raises
+    ------
+    MeshError
+        The surface is open, in several pieces, not manifold, inside out or degenerate.
+    SelfIntersectionError
+        The linking numbers are not those of an embedded surface.
+    ArrayError
+        ``surface`` is not the boundary of ``solid``.
+    GenusError
+        The first Betti number of the solid is not the genus of its boundary.
+
+    Notes
+    -----
+    Signs: the pair longitude, meridian may be turned round as a whole; only its orientation with
+    respect to the outward normal is fixed.
+    """
+    surface.require_closed()
+    top = surface.topology
+    lists, forms = _core.tree_cotree(top, _core.edge_lengths(top, surface.V))
+    loops = [np.array(loop, dtype=np.int32) for loop in lists]
+    wedge = np.rint(_core.wedge_matrix(top, forms.astype(float))).astype(np.int64)
+    intersection = integer_inverse(wedge).T
+    harmonic = solve_harmonic(surface, forms)
+
+    within = None if solid is None else bounding_in(solid, surface, loops)
+    try:
+        linking, inside, tunnel = bounding_by_linking(surface, loops, intersection)
+        if within is not None and not same_lattice(inside, within):
+            raise SelfIntersectionError("the linking numbers contradict the solid")
+    except SelfIntersectionError as error:
+        if within is None:
+            raise
+        logger.warning("%s: the solid decides, loops that bound outside are left out", error)
+        linking = tunnel = None
+    handle = inside if within is None else within
+    # x G^-1 x is the extremal length of class x.
+    handle = reduced_basis(handle, np.linalg.inv(harmonic.gram))
+    if tunnel is not None:
+        tunnel = integer_inverse(tunnel @ intersection @ handle.T) @ tunnel
+
+    classes = matrix = torus_forms = None
+    if len(handle) == 1:
+        longitude = least_skew_longitude(handle[0], tunnel, intersection, harmonic.gram)
+        classes = np.stack([longitude, handle[0]])
+        matrix = integer_inverse(classes.T)
+        torus_forms = read_only((matrix @ forms).astype(np.int32))
+    return HomologyBasis(
+        surface=surface,
+        genus=len(handle),
+        generators=tuple(read_only(loop) for loop in loops),
+        dual_forms=read_only(forms),
+        intersection=intersection,
+        linking=linking,
+        handle_classes=handle,
+        tunnel_classes=tunnel,
+        harmonic=harmonic,
+        torus_classes=classes,
+        torus_matrix=matrix,
+        torus_forms=torus_forms,
+    )

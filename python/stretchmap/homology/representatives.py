@@ -1,0 +1,88 @@
+"""Harmonic and holomorphic 1-forms of the classes of a homology basis."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from ..base.arrays import read_only
+
+if TYPE_CHECKING:
+    from ..homology.basis import HomologyBasis
+    from ..mesh.meshes import TriMesh
+from ..forms.harmonic import HarmonicForms, solve_harmonic
+from ..forms.holomorphic import HolomorphicForms
+
+__all__ = ["harmonic_forms", "holomorphic_forms"]
+
+
+def harmonic_forms(
+    surface: TriMesh, basis: HomologyBasis | None = None, *, weights: str = "cotangent"
+) -> HarmonicForms:
+    """Harmonic 1-forms dual to the homology generators, (3.2)-(3.5).
+
+    One factorisation of the Laplacian, 2g right-hand sides.
+
+    Parameters
+    ----------
+    surface : TriMesh
+        Closed surface of any genus.
+    basis : HomologyBasis, optional
+        Generators and dual forms; computed if left out.
+    weights : {"cotangent", "intrinsic_delaunay", "clamped"}
+        See `HarmonicForms`.
+
+    Returns
+    -------
+    HarmonicForms
+
+    Raises
+    ------
+    MeshError
+        As `homology_basis`.
+    OptionError
+        Unknown weights.
+    SolverError
+        The Laplacian could not be factorised.
+    """
+    if basis is None:
+        from ..homology.basis import homology_basis
+
+        basis = homology_basis(surface)
+    if weights == basis.harmonic.weights:
+        return basis.harmonic
+    return solve_harmonic(surface, basis.dual_forms, weights)
+
+
+def holomorphic_forms(surface: TriMesh, basis: HomologyBasis | None = None) -> HolomorphicForms:
+    """Basis of the holomorphic 1-forms of a closed surface of any genus, (3.6)-(3.12).
+
+    Parameters
+    ----------
+    surface : TriMesh
+        Closed surface of genus at least one.
+    basis : HomologyBasis, optional
+        Generators and dual forms; computed if left out.
+
+    Returns
+    -------
+    HolomorphicForms
+        2g forms; over the complex numbers they span a space of dimension g.
+
+    Raises
+    ------
+    MeshError, SolverError
+        As `homology_basis`.
+    """
+    real = harmonic_forms(surface, basis).forms
+    star, wedge = _core.hodge_products(surface.topology, surface.V, real)
+    coefficients = np.linalg.solve(wedge, star).T if len(real) else np.zeros((0, 0))
+    return HolomorphicForms(
+        real=real,
+        imag=read_only(coefficients @ real),
+        coefficients=read_only(coefficients),
+        star=read_only(star),
+        wedge=read_only(wedge),
+    )

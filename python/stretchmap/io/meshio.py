@@ -1,0 +1,141 @@
+"""The one place that talks to meshio, for the formats of solids.
+
+meshio exits the interpreter on some bad files, prints, leaves out cells a format cannot hold, and
+returns arrays in the file's byte order. Here its readers are called by format and never by
+guesswork, every way out of them becomes an exception, its output is caught, and cells that
+stretchmap cannot use are named.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError, MissingDependencyError
+from .arrays import MeshArrays
+
+_log = logging.getLogger("stretchmap")
+
+# Cells below the surface (points and curves that mesh generators add) carry nothing we need.
+_IGNORED = {"vertex", "line", "line3"}
+
+
+def read_meshio(path: Path, file_format: str) -> MeshArrays:
+    """Read a file in one of meshio's formats.
+
+    Parameters
+    ----------
+    path : Path
+    file_format : str
+        meshio's name of the format.
+
+    Returns
+    -------
+    MeshArrays
+        ``T`` when there are tets, ``F`` when there are triangles.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be parsed or holds other cells.
+    MissingDependencyError
+        meshio, or what it needs for this format, is not installed.
+    """
+    meshio = _import(f"reading {path.suffix} files")
+    with _guarded(path):
+        mesh = meshio._helpers.reader_map[file_format](str(path))
+    faces, face_blocks = _cells(mesh, "triangle")
+    tets, tet_blocks = _cells(mesh, "tetra")
+    other = {block.type: 0 for block in mesh.cells}
+    for block in mesh.cells:
+        other[block.type] += len(block.data)
+    found = [f"{count} {kind}" for kind, count in other.items() if count]
+    odd = set(other) - {"triangle", "tetra"} - _IGNORED
+    if any(other[kind] for kind in odd):
+        raise FileFormatError(
+            f"the cells are {', '.join(found)}; only triangles and tets of first order can be "
+            "used, split or convert the others"
+        )
+    if tets is None and faces is None:
+        raise FileFormatError(f"no triangles and no tets ({', '.join(found) or 'no cells'})")
+    blocks = face_blocks if tets is None else tet_blocks
+    return MeshArrays(
+        mesh.points,
+        F=faces,
+        T=tets,
+        point_data={k: np.asarray(a) for k, a in mesh.point_data.items()},
+        cell_data={
+            k: np.concatenate([np.asarray(parts[b]) for b in blocks])
+            for k, parts in mesh.cell_data.items()
+        },
+    )
+
+
+def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
+    """Write a mesh in one of meshio's formats."""
+    meshio = _import(f"writing {path.suffix} files")
+    kind, cells = ("triangle", mesh.F) if mesh.T is None else ("tetra", mesh.T)
+    options: dict[str, Any] = {"data_format": "XML"} if file_format == "xdmf" else {}
+    with _guarded(path):
+        out = meshio.Mesh(
+            mesh.V,
+            [(kind, cells)],
+            point_data={k: _plain(a) for k, a in mesh.point_data.items()},
+            cell_data={k: [_plain(a)] for k, a in mesh.cell_data.items()},
+        )
+        meshio._helpers._writer_map[file_format](str(path), out, **options)
+
+
+def _plain(array: NDArray[Any]) -> NDArray[Any]:
+    return array.astype(np.uint8) if array.dtype.kind == "b" else array
+
+
+def _cells(mesh: Any, kind: str) -> tuple[NDArray[Any] | None, list[int]]:
+    """All cells of one kind, and the blocks they come from."""
+    blocks = [b for b, block in enumerate(mesh.cells) if block.type == kind and len(block.data)]
+    if not blocks:
+        return None, []
+    return np.concatenate([np.asarray(mesh.cells[b].data) for b in blocks]), blocks
+
+
+def _import(task: str) -> Any:
+    try:
+        import meshio
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{task} needs meshio: pip install 'stretchmap[io]'"
+        ) from error
+    return meshio
+
+
+@contextlib.contextmanager
+def _guarded(path: Path) -> Iterator[None]:
+    """Catch what meshio prints and every way it fails."""
+    output = io.StringIO()
+    try:
+        with (
+            contextlib.redirect_stdout(output),
+            contextlib.redirect_stderr(output),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore")
+            warnings.filterwarnings("error", message=".*could not be read to its end.*")
+            yield
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError(
+            f"{path.suffix} files need {error.name}: pip install 'stretchmap[io]'"
+        ) from error
+    except (Exception, SystemExit) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FileFormatError(reason) from error
+    finally:
+        if output.getvalue().strip():
+            _log.debug("meshio on %s: %s", path, output.getvalue().strip())

@@ -1,0 +1,79 @@
+"""Reader and writer of OBJ."""
+
+from __future__ import annotations
+
+import re
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+from .arrays import MeshArrays
+
+# ------------------------------------------------------------------------------------------- OBJ
+
+_CORNER = rb"[ \t]+(-?\d+)(?:/(-?\d*))?(?:/-?\d*)?"
+_FACE = re.compile(rb"^[ \t]*f" + 3 * _CORNER + rb"[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+_FACE_LINE = re.compile(rb"^[ \t]*f[ \t].*$", re.MULTILINE)
+
+
+def read_obj(data: bytes) -> MeshArrays:
+    """Parse an OBJ file: ``v``, ``vt`` and triangular ``f`` lines; groups and the rest are skipped.
+
+    Texture coordinates may differ at the corners that meet in a vertex (a seam).
+    """
+    data = re.sub(rb"\\\r?\n", b" ", data)
+    points, last_point = _obj_table(data, b"v", 3)
+    corners = _FACE.findall(data)
+    lines = _FACE_LINE.findall(data)
+    if len(corners) != len(lines):
+        odd = next(line for line in lines if not _FACE.match(line))
+        raise FileFormatError(f"not a triangle: {odd.decode(errors='replace').strip()!r}")
+    if not corners or not len(points):
+        raise FileFormatError(f"{len(points)} vertices and {len(corners)} faces")
+    table = np.array(corners)
+    first_face = _FACE_LINE.search(data).start()  # type: ignore[union-attr]
+    in_order = last_point <= first_face
+    faces = _obj_ids(table[:, 0::2], len(points), in_order)
+    corner_uv = None
+    if (table[:, 1::2] != b"").all():
+        uv, last_uv = _obj_table(data, b"vt", 2)
+        ids = _obj_ids(table[:, 1::2], len(uv), last_uv <= first_face)
+        if ((ids < 0) | (ids >= len(uv))).any():
+            raise FileFormatError("texture indices point outside the vt lines")
+        corner_uv = uv[ids]
+    return MeshArrays(points, F=faces, corner_uv=corner_uv)
+
+
+def _obj_table(data: bytes, key: bytes, width: int) -> tuple[NDArray[np.float64], int]:
+    """All lines of one kind as an array, and where the last of them begins."""
+    pattern = re.compile(rb"^[ \t]*" + key + rb"[ \t]+(.*)$", re.MULTILINE)
+    lines = pattern.findall(data)
+    if not lines:
+        return np.empty((0, width)), 0
+    last = max(data.rfind(b"\n" + key + b" "), data.rfind(b"\n" + key + b"\t"))
+    text = [line.decode("ascii") for line in lines]
+    return np.loadtxt(text, usecols=range(width), ndmin=2), last
+
+
+def _obj_ids(words: NDArray[np.bytes_], n: int, in_order: bool) -> NDArray[np.int64]:
+    ids = words.astype(np.int64)
+    if (ids < 0).any():
+        if not in_order:
+            raise FileFormatError("relative indices in a file whose vertices and faces alternate")
+        return np.where(ids < 0, ids + n, ids - 1)
+    return ids - 1
+
+
+def write_obj(file: BinaryIO, mesh: MeshArrays) -> None:
+    """Write points, faces and, where given, texture coordinates, seams included."""
+    faces = mesh.F + 1
+    np.savetxt(file, mesh.V, fmt="v %.17g %.17g %.17g")
+    if mesh.corner_uv is None:
+        np.savetxt(file, faces, fmt="f %d %d %d")
+        return
+    uv, ids = np.unique(mesh.corner_uv.reshape(-1, 2), axis=0, return_inverse=True)
+    np.savetxt(file, uv, fmt="vt %.17g %.17g")
+    table = np.stack([faces, ids.reshape(faces.shape) + 1], axis=-1).reshape(-1, 6)
+    np.savetxt(file, table, fmt="f %d/%d %d/%d %d/%d")

@@ -1,0 +1,41 @@
+"""Reader and writer of OFF."""
+
+from __future__ import annotations
+
+import re
+from typing import BinaryIO
+
+import numpy as np
+
+from ..errors import FileFormatError
+from .arrays import MeshArrays, triangles_only
+
+# ------------------------------------------------------------------------------------------- OFF
+
+
+def read_off(data: bytes) -> MeshArrays:
+    """Parse an OFF file of triangles; normals and colours of the variants are skipped."""
+    text = re.sub(rb"#.*", b"", data)
+    header = re.match(rb"\s*((?:ST)?C?N?)OFF\b", text)
+    if not header:
+        raise FileFormatError("the first word is not OFF")
+    if re.match(rb"\s*BINARY\b", text[header.end() :]):
+        raise FileFormatError("binary OFF is not supported; save it as text")
+    lines = [line for line in text[header.end() :].decode("ascii").splitlines() if line.strip()]
+    n, m = (int(word) for word in lines[0].split()[:2])
+    if len(lines) < 1 + n + m:
+        raise FileFormatError(f"{n} points and {m} faces announced, {len(lines) - 1} lines follow")
+    if n == 0 or m == 0:
+        raise FileFormatError(f"{n} points and {m} faces")
+    points = np.loadtxt(lines[1 : 1 + n], usecols=(0, 1, 2), ndmin=2)
+    faces = lines[1 + n : 1 + n + m]
+    sizes = np.loadtxt(faces, usecols=0, dtype=np.int64, ndmin=1)
+    triangles_only(sizes)
+    return MeshArrays(points, F=np.loadtxt(faces, usecols=(1, 2, 3), dtype=np.int64, ndmin=2))
+
+
+def write_off(file: BinaryIO, mesh: MeshArrays) -> None:
+    """Write points and faces."""
+    file.write(f"OFF\n{len(mesh.V)} {len(mesh.F)} 0\n".encode())
+    np.savetxt(file, mesh.V, fmt="%.17g %.17g %.17g")
+    np.savetxt(file, mesh.F, fmt="3 %d %d %d")

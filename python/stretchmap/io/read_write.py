@@ -1,0 +1,293 @@
+"""Reading and writing meshes.
+
+============================  =========  ======================================================
+format                        holds      remarks
+============================  =========  ======================================================
+``.npz``                      both       ``V`` with ``F`` or ``T``, further arrays by their names
+``.obj``                      surfaces   texture coordinates per corner (seams)
+``.off``                      surfaces
+``.ply``                      surfaces   point and cell arrays as properties
+``.stl``                      surfaces   single precision; equal corners become one vertex
+``.vtu .vtk .xdmf .msh``      both       point and cell arrays; through meshio
+``.mesh``                     both       no arrays; through meshio
+============================  =========  ======================================================
+
+What is written goes to a temporary file beside the target first and is renamed at the end, so a
+failure leaves nothing behind and never half a file.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.files import atomic_path
+from ..errors import ArrayError, FileFormatError, StretchmapError
+from ..mesh.meshes import TetMesh, TriMesh
+from .arrays import MeshArrays
+from .meshio import read_meshio, write_meshio
+from .npz import save_npz
+from .obj import read_obj, write_obj
+from .off import read_off, write_off
+from .ply import read_ply, write_ply
+from .stl import read_stl, write_stl
+
+__all__ = ["MeshArrays", "read", "read_arrays", "suffixes", "write"]
+
+_log = logging.getLogger("stretchmap")
+
+_READERS: dict[str, Callable[[bytes], MeshArrays]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+}
+_WRITERS: dict[str, Callable[[BinaryIO, MeshArrays], None]] = {
+    ".obj": write_obj,
+    ".off": write_off,
+    ".ply": write_ply,
+    ".stl": write_stl,
+}
+# Suffix -> meshio's name of the format.
+_MESHIO = {".msh": "gmsh", ".vtu": "vtu", ".vtk": "vtk", ".mesh": "medit", ".xdmf": "xdmf"}
+_WITHOUT_DATA = {".obj", ".off", ".stl", ".mesh"}
+_MESH_KEYS = ("V", "F", "T")
+
+
+def suffixes(solid: bool) -> tuple[str, ...]:
+    """Return the suffixes of the formats that can hold a solid, or a surface."""
+    return (".npz", *_MESHIO) if solid else (".npz", *_WRITERS, *_MESHIO)
+
+
+def read(
+    path: str | os.PathLike[str], *, orient: bool = False, compact: bool = False
+) -> TriMesh | TetMesh:
+    """Read a mesh; the suffix names the format.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.npz .obj .off .ply .stl .msh .vtu .vtk .mesh .xdmf``.
+    orient : bool
+        Repair the orientation, as the constructors of `TriMesh` and `TetMesh` do.
+    compact : bool
+        Drop points that no element uses (mesh generators like to leave some). Without it row i of
+        ``V`` is point i of the file.
+
+    Returns
+    -------
+    TriMesh or TetMesh
+        A solid when the file holds tets; the triangles beside them are ignored.
+
+    Raises
+    ------
+    FileFormatError
+        Unknown suffix; an empty, truncated or unintelligible file; other cells than triangles and
+        tets.
+    MissingDependencyError
+        The format needs meshio and it is not installed.
+    MeshError
+        The arrays in the file are not a mesh (index out of range, NaN, ...).
+    OSError
+        The file cannot be opened.
+    """
+    arrays = read_arrays(path)
+    mesh: TriMesh | TetMesh
+    if arrays.T is not None:
+        mesh = TetMesh(arrays.V, arrays.T, orient=orient)
+    else:
+        mesh = TriMesh(arrays.V, arrays.F, orient=orient)  # type: ignore[arg-type]
+    return mesh.compact()[0] if compact else mesh
+
+
+def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
+    """Read all arrays of a mesh file without judging them.
+
+    Parameters
+    ----------
+    path : path-like
+        As for `read`.
+
+    Returns
+    -------
+    MeshArrays
+
+    Raises
+    ------
+    FileFormatError, MissingDependencyError, OSError
+        As for `read`.
+    """
+    path = Path(path)
+    suffix = _known_suffix(path, {".npz", *_READERS, *_MESHIO})
+    with open(path, "rb") as file:
+        if not file.read(1):
+            raise FileFormatError(f"{path} is empty")
+        file.seek(0)
+        with _parsing(path):
+            if suffix in _READERS:
+                return _READERS[suffix](file.read())
+            if suffix == ".npz":
+                return _read_npz(file)
+    with _parsing(path):
+        return read_meshio(path, _MESHIO[suffix])
+
+
+def write(
+    path: str | os.PathLike[str],
+    mesh: TriMesh | TetMesh,
+    point_data: Mapping[str, ArrayLike] | None = None,
+    cell_data: Mapping[str, ArrayLike] | None = None,
+    corner_uv: ArrayLike | None = None,
+) -> None:
+    """Write a mesh; the suffix names the format.
+
+    Parameters
+    ----------
+    path : path-like
+        As for `read`. An existing file is replaced, but only once the new one is complete.
+    mesh : TriMesh or TetMesh
+    point_data, cell_data : mapping of str to (n,) or (n, d) array_like, optional
+        One row per vertex, or per face or tet. Formats without arrays leave them out.
+    corner_uv : (m, 3, 2) array_like, optional
+        Texture coordinates of the corners of the faces; ``.obj`` only. They may differ at one
+        vertex (seam).
+
+    Raises
+    ------
+    FileFormatError
+        Unknown suffix, or the format cannot hold tets or texture coordinates.
+    ArrayError
+        An array with the wrong number of rows, not numeric, or named like a mesh array.
+    MissingDependencyError
+        The format needs meshio and it is not installed.
+    OSError
+        The file cannot be written.
+    """
+    path = Path(path)
+    suffix = _known_suffix(path, {".npz", *_WRITERS, *_MESHIO})
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such folder", str(path.parent))
+    solid = isinstance(mesh, TetMesh)
+    if solid and suffix in _WRITERS:
+        raise FileFormatError(
+            f"{path}: {suffix} holds surfaces only; write mesh.surface, or the solid as "
+            f"{', '.join(suffixes(solid=True))}"
+        )
+    elements = mesh.T if isinstance(mesh, TetMesh) else mesh.F
+    arrays = MeshArrays(
+        mesh.V,
+        F=None if solid else elements,
+        T=elements if solid else None,
+        point_data=_checked(point_data, len(mesh.V), "point_data"),
+        cell_data=_checked(cell_data, len(elements), "cell_data"),
+        corner_uv=_checked_uv(corner_uv, suffix, elements),
+    )
+    if suffix in _WITHOUT_DATA and (arrays.point_data or arrays.cell_data):
+        names = [*arrays.point_data, *arrays.cell_data]
+        _log.info("%s holds no arrays, left out: %s", path, ", ".join(names))
+        arrays = MeshArrays(arrays.V, arrays.F, arrays.T, corner_uv=arrays.corner_uv)
+    with atomic_path(path) as temporary:
+        if suffix in _MESHIO:
+            try:
+                write_meshio(temporary, arrays, _MESHIO[suffix])
+            except FileFormatError as error:
+                raise FileFormatError(f"{path}: {error}") from error
+        else:
+            with open(temporary, "wb") as file:
+                if suffix == ".npz":
+                    _write_npz(file, arrays)
+                else:
+                    _WRITERS[suffix](file, arrays)
+
+
+def _known_suffix(path: Path, known: set[str]) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in known:
+        raise FileFormatError(
+            f"{path}: unknown format {suffix or '(no suffix)'}; known are "
+            f"{', '.join(suffixes(solid=False))}"
+        )
+    return suffix
+
+
+@contextmanager
+def _parsing(path: Path) -> Iterator[None]:
+    """Turn whatever a parser raises into one error that names the file."""
+    try:
+        yield
+    except FileFormatError as error:
+        raise FileFormatError(f"{path} cannot be read: {error}") from error
+    except StretchmapError:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FileFormatError(f"{path} is damaged or not what its name says: {reason}") from error
+
+
+def _read_npz(file: BinaryIO) -> MeshArrays:
+    loaded = np.load(file, allow_pickle=False)
+    if not isinstance(loaded, np.lib.npyio.NpzFile):
+        raise FileFormatError("it holds a single array; V and F or T are needed")
+    with loaded as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    if "V" not in arrays or not {"F", "T"} & arrays.keys():
+        raise FileFormatError(
+            f"V and F or T are needed, it holds {', '.join(sorted(arrays)) or 'nothing'}"
+        )
+    V, F, T = (arrays.get(name) for name in _MESH_KEYS)
+    n, m = (len(a) if a.ndim else 0 for a in (V, F if T is None else T))
+    point_data: dict[str, NDArray[Any]] = {}
+    cell_data: dict[str, NDArray[Any]] = {}
+    extra: dict[str, NDArray[Any]] = {}
+    for name, array in arrays.items():
+        if name in _MESH_KEYS:
+            continue
+        rows = len(array) if array.ndim else -1
+        target = point_data if rows == n else cell_data if rows == m else extra
+        target[name] = array
+    return MeshArrays(V, F, T, point_data, cell_data, extra)
+
+
+def _write_npz(file: BinaryIO, mesh: MeshArrays) -> None:
+    clash = mesh.point_data.keys() & mesh.cell_data.keys()
+    clash |= (mesh.point_data.keys() | mesh.cell_data.keys()) & {*_MESH_KEYS, "file"}
+    if clash:
+        raise ArrayError(f"an .npz file cannot hold two arrays named {', '.join(sorted(clash))}")
+    elements = {"F": mesh.F} if mesh.T is None else {"T": mesh.T}
+    save_npz(file, {"V": mesh.V, **elements, **mesh.point_data, **mesh.cell_data})
+
+
+def _checked(data: Mapping[str, ArrayLike] | None, rows: int, what: str) -> dict[str, NDArray[Any]]:
+    checked: dict[str, NDArray[Any]] = {}
+    for name, values in (data or {}).items():
+        array = np.asarray(values)
+        if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or len(array) != rows:
+            raise ArrayError(
+                f"{what}[{name!r}] must be numeric with {rows} rows, not {array.dtype} of shape "
+                f"{array.shape}"
+            )
+        checked[name] = array
+    return checked
+
+
+def _checked_uv(
+    corner_uv: ArrayLike | None, suffix: str, faces: NDArray[np.int32]
+) -> NDArray[np.float64] | None:
+    if corner_uv is None:
+        return None
+    if suffix != ".obj":
+        raise FileFormatError(f"{suffix} files hold no texture coordinates; write an .obj")
+    uv = np.asarray(corner_uv, dtype=np.float64)
+    if uv.shape != (len(faces), 3, 2):
+        raise ArrayError(f"corner_uv must have shape ({len(faces)}, 3, 2), not {uv.shape}")
+    if not np.isfinite(uv).all():
+        raise ArrayError("corner_uv holds NaN or infinite values")
+    return uv

@@ -1,0 +1,48 @@
+"""Reader and writer of STL, text and binary."""
+
+from __future__ import annotations
+
+import re
+from typing import BinaryIO
+
+import numpy as np
+
+from ..errors import FileFormatError
+from .arrays import MeshArrays
+
+# ------------------------------------------------------------------------------------------- STL
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def read_stl(data: bytes) -> MeshArrays:
+    """Parse an STL file, text or binary; corners with equal coordinates become one vertex."""
+    count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else -1
+    if len(data) == 84 + count * _FACET.itemsize:
+        corners = np.frombuffer(data, _FACET, count, offset=84)["corners"].reshape(-1, 3)
+    elif data.lstrip()[:5].lower() == b"solid":
+        if b"endsolid" not in data:
+            raise FileFormatError("endsolid is missing, the file is cut off")
+        lines = re.findall(rb"^\s*vertex\s+(.*)$", data, re.MULTILINE)
+        corners = np.array([line.split() for line in lines]).astype(np.float64)
+    else:
+        raise FileFormatError(
+            f"{len(data)} bytes, but the header announces {max(count, 0)} triangles"
+        )
+    if not len(corners) or len(corners) % 3:
+        raise FileFormatError(f"{len(corners)} triangle corners")
+    points, faces = np.unique(corners + 0.0, axis=0, return_inverse=True)
+    return MeshArrays(points, F=faces.reshape(-1, 3))
+
+
+def write_stl(file: BinaryIO, mesh: MeshArrays) -> None:
+    """Write a binary STL; coordinates are rounded to single precision."""
+    facets = np.zeros(len(mesh.F), _FACET)
+    facets["corners"] = mesh.V[mesh.F]
+    a, b, c = np.moveaxis(mesh.V[mesh.F], 1, 0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    facets["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    file.write(b"binary STL".ljust(80))
+    file.write(np.uint32(len(facets)).astype("<u4").tobytes())
+    file.write(facets.tobytes())

@@ -1,0 +1,1 @@
+"""What all maps have in common: results, files, points carried through them."""

@@ -1,0 +1,169 @@
+"""Map files that come back."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import as_points
+from ..base.torus import Torus
+from ..errors import FileFormatError
+
+if TYPE_CHECKING:
+    from ..measures.elements import Distortion
+    from ..mesh.meshes import TetMesh, TriMesh
+from .history import NAN, IterationRecord
+from .result import MapResult
+
+__all__ = ["LoadedMap", "load_map"]
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedMap(MapResult):
+    """A map read back from a file, whoever wrote it.
+
+    Attributes
+    ----------
+    solid, surface : TetMesh or TriMesh, or None
+        The source mesh; one of them is None.
+    image : ndarray, shape (n, 3)
+    torus : Torus or None
+        None when the file names none.
+    arrays : dict
+        All further arrays of the file.
+    meta : dict
+        The scalars stored with it; empty for a file of another program.
+    history, converged, stop_reason, seconds
+        As in the result that was saved.
+    """
+
+    solid: TetMesh | None
+    surface: TriMesh | None
+    image: NDArray[np.float64]
+    torus: Torus | None
+    arrays: dict[str, NDArray[Any]] = field(repr=False)
+    meta: dict[str, Any] = field(repr=False)
+    history: tuple[IterationRecord, ...] = field(repr=False)
+    converged: bool
+    stop_reason: str
+    seconds: Mapping[str, float]
+
+    @property
+    def title(self) -> str:  # type: ignore[override]
+        """Kind of map, as stored."""
+        return str(self.meta.get("kind", "map"))
+
+    @property
+    def distortion(self) -> Distortion:  # type: ignore[override]
+        """Measured anew from the mesh and the image."""
+        from ..measures.elements import distortion
+
+        angles = self.arrays.get("angles")
+        torus = self.torus if angles is None else None
+        return distortion(self.mesh, self.image, torus=torus, angles=angles)
+
+    @cached_property
+    def target(self) -> TetMesh | None:
+        """The solid mapped to; None if the file holds no registration."""
+        from ..mesh.meshes import TetMesh
+
+        if "target_V" not in self.arrays or "target_T" not in self.arrays:
+            return None
+        return TetMesh(self.arrays["target_V"], self.arrays["target_T"])
+
+    def to_dict(self, history: bool = False) -> dict[str, Any]:
+        """As `MapResult.to_dict`, with what else the file says, but for its certificate."""
+        found = super().to_dict(history)
+        known = (*found, "history", "certified", "certificate")
+        return found | {name: value for name, value in self.meta.items() if name not in known}
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays the file held beyond the common ones."""
+        return {k: a for k, a in self.arrays.items() if k not in ("ratios", "ring_ratios")}
+
+
+def load_map(path: str | os.PathLike[str]) -> LoadedMap:
+    """Read a map file written by :meth:`MapResult.save` or by somebody else.
+
+    Parameters
+    ----------
+    path : path-like
+        An ``.npz`` with ``V (n, 3)``, ``F`` or ``T``, and ``image (n, 3)``.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not such an ``.npz``.
+    MeshError
+        If the mesh in it is invalid, or the image not finite.
+    OSError
+        If it cannot be opened.
+    """
+    from ..mesh.meshes import TetMesh, TriMesh
+
+    with open(path, "rb") as stream:
+        if not zipfile.is_zipfile(stream):
+            raise FileFormatError(f"{path} is not a readable .npz file")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise FileFormatError(f"{path} is not a readable .npz file: {error}") from None
+    if "V" in arrays and "image" not in arrays and ("F" in arrays or "T" in arrays):
+        raise FileFormatError(f"{path} holds a mesh and no image of it: it has to be mapped first")
+    missing = [key for key in ("V", "image") if key not in arrays]
+    if missing or ("F" in arrays) == ("T" in arrays):
+        raise FileFormatError(f"{path} must hold V, image and either F or T; it has {list(arrays)}")
+    meta = _read_meta(path, arrays.pop("meta", None))
+    V, image = arrays.pop("V"), as_points(arrays.pop("image"), "image")
+    if image.shape != V.shape:
+        raise FileFormatError(f"{path}: image has shape {image.shape}, V {V.shape}")
+    solid = TetMesh(V, arrays.pop("T")) if "T" in arrays else None
+    surface = TriMesh(V, arrays.pop("F")) if "F" in arrays else None
+    radii = arrays.pop("torus", None)
+    if radii is not None and radii.shape != (2,):
+        raise FileFormatError(f"{path}: torus must hold R and r, it has shape {radii.shape}")
+    return LoadedMap(
+        solid=solid,
+        surface=surface,
+        image=image,
+        torus=None if radii is None else Torus(*radii),
+        arrays=arrays,
+        meta=meta,
+        history=_read_history(path, meta.get("history", [])),
+        converged=bool(meta.get("converged", False)),
+        stop_reason=str(meta.get("stop_reason", "read from a file")),
+        seconds=meta.get("seconds", {}),
+    )
+
+
+def _read_meta(path: object, meta: NDArray[Any] | None) -> dict[str, Any]:
+    if meta is None:
+        return {}
+    try:
+        value = json.loads(str(meta))
+    except ValueError as error:
+        raise FileFormatError(f"{path}: meta is not JSON: {error}") from None
+    if not isinstance(value, dict):
+        raise FileFormatError(f"{path}: meta is not a JSON object")
+    return value
+
+
+def _read_history(path: object, records: Any) -> tuple[IterationRecord, ...]:
+    names = [f.name for f in dataclasses.fields(IterationRecord)]
+    try:
+        return tuple(
+            IterationRecord(**{k: NAN if record[k] is None else record[k] for k in names})
+            for record in records
+        )
+    except (TypeError, KeyError, AttributeError) as error:
+        raise FileFormatError(f"{path}: the history in meta cannot be read: {error!r}") from None

@@ -1,0 +1,49 @@
+"""One record per step of an iteration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["IterationRecord"]
+
+NAN = math.nan
+
+
+@dataclass(frozen=True)
+class IterationRecord:
+    """One step of an iteration; what a method does not compute stays NaN (``flips`` -1).
+
+    Attributes
+    ----------
+    stage : str
+        ``"sem"``, ``"newton"``, ``"vsem"``, ``"untangle"``, ...
+    iteration : int
+        Counted from 0 (the start) within the stage.
+    energy : float
+        Value of what the stage minimises.
+    step : float
+        Length of the step or of the line search.
+    residual : float
+        Gradient norm or whatever the stage stops on.
+    flips : int
+        Number of elements with the wrong sign.
+    ring_sd, element_sd : float
+        Standard deviation of the per-vertex ratios (6.3)/(6.5) and of the per-element ratios.
+    seconds : float
+        Since the start of the stage.
+    """
+
+    stage: str
+    iteration: int
+    energy: float = NAN
+    step: float = NAN
+    residual: float = NAN
+    flips: int = -1
+    ring_sd: float = NAN
+    element_sd: float = NAN
+    seconds: float = NAN

@@ -1,0 +1,225 @@
+"""Solid-torus coordinates (7.1) of a mapped solid, and the map and its inverse at any point.
+
+A map is affine on every tet. A point is sent to its image by finding the source tet it lies in, and
+back by finding the image tet; both directions use the barycentric coordinates there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..base.arrays import as_points, read_only
+from ..errors import ArrayError, OptionError
+
+if TYPE_CHECKING:
+    from ..base.torus import Torus
+    from ..mesh.meshes import TetMesh, TriMesh
+
+__all__ = ["CarriesPoints", "Located", "PointMap"]
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Points carried through a map.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        Where each point goes; NaN for a point outside the mesh, nothing is guessed.
+    inside : ndarray of bool, shape (n,)
+    tets : ndarray of int32, shape (n,)
+        The tet each point was found in, -1 outside.
+    weights : ndarray, shape (n, 4)
+        Barycentric coordinates there, summing to one; NaN outside.
+    """
+
+    points: NDArray[np.float64]
+    inside: NDArray[np.bool_]
+    tets: NDArray[np.int32]
+    weights: NDArray[np.float64]
+
+    def interpolate(self, T: NDArray[np.int32], values: ArrayLike) -> NDArray[np.float64]:
+        """Values at the points from values at the vertices of the mesh.
+
+        Parameters
+        ----------
+        T : ndarray of int32, shape (k, 4)
+            Tets of the mesh.
+        values : array_like, shape (m,) or (m, c)
+            One row per vertex.
+
+        Returns
+        -------
+        ndarray, shape (n,) or (n, c)
+            NaN outside.
+        """
+        return _interpolate(np.asarray(values, float), T, self.tets, self.weights)
+
+
+class PointMap:
+    """A map of a solid as a function of points, in both directions.
+
+    The search structures are built on first use and kept.
+
+    Parameters
+    ----------
+    result : VolumeMap, Registration, LoadedMap or any map result of a solid
+        Its own ``point_map`` has the default tolerance.
+    tolerance : float
+        A point of the boundary counts as inside if it lies no farther than this outside, as a share
+        of the diagonal of the bounding box. Its image is extrapolated from the nearest tet at hand,
+        so that there and back is the identity for it, too.
+
+    Raises
+    ------
+    ArrayError
+        If the map is that of a surface.
+    NonFiniteError
+        If the image has NaN or infinite coordinates.
+    OptionError
+        If the tolerance is negative or not finite.
+
+    Notes
+    -----
+    The image of a curved boundary is a polyhedron: a point of the torus between its vertices lies
+    outside it by the height of the chord, far more than the tolerance.
+    """
+
+    def __init__(self, result: CarriesPoints, tolerance: float = 1e-9) -> None:
+        if not hasattr(result.mesh, "T"):
+            raise ArrayError("points are carried by maps of solids; this is the map of a surface")
+        if not (tolerance >= 0.0 and np.isfinite(tolerance)):
+            raise OptionError(f"tolerance must be finite and not negative, got {tolerance}")
+        self._T = result.mesh.T
+        self._ends = (result.mesh.V, as_points(result.image, "image"))
+        self._tolerance = tolerance
+        self._locators: list[_core.TetLocator | None] = [None, None]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the search structures, which are built anew where they are needed."""
+        return {**self.__dict__, "_locators": [None, None]}
+
+    def forward(self, points: ArrayLike) -> Located:
+        """Carry points of the source to the image.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
+
+        Returns
+        -------
+        Located
+
+        Raises
+        ------
+        ArrayError
+            If ``points`` does not have that shape.
+        NonFiniteError
+            If a coordinate is NaN or infinite.
+        """
+        return self._carry(points, 0)
+
+    def inverse(self, points: ArrayLike) -> Located:
+        """Carry points of the image to the source; as `forward`."""
+        return self._carry(points, 1)
+
+    def _carry(self, points: ArrayLike, start: int) -> Located:
+        queries = as_points(points, "points")
+        locator = self._locators[start]
+        if locator is None:
+            V = self._ends[start]
+            diagonal = float(np.linalg.norm(np.ptp(V, axis=0)))
+            locator = _core.TetLocator(V, self._T, self._tolerance * diagonal)
+            self._locators[start] = locator
+        tets, weights = locator.locate(queries)
+        return Located(
+            points=_interpolate(self._ends[1 - start], self._T, tets, weights),
+            inside=tets >= 0,
+            tets=tets,
+            weights=weights,
+        )
+
+
+class CarriesPoints:
+    """What every map of a solid does with points; mixed into `MapResult`."""
+
+    if TYPE_CHECKING:
+        mesh: TriMesh | TetMesh
+        image: NDArray[np.float64]
+        torus: Torus | None
+
+    @cached_property
+    def point_map(self) -> PointMap:
+        """The map as a function of points, which also says what lies outside and in which tet."""
+        return PointMap(self)
+
+    def forward(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Carry points of the source solid through the map.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            NaN for points outside the source; ``point_map.forward`` says more.
+
+        Raises
+        ------
+        ArrayError
+            If ``points`` does not have that shape, or the map is that of a surface.
+        NonFiniteError
+            If a coordinate is NaN or infinite.
+        """
+        return self.point_map.forward(points).points
+
+    def inverse(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Carry points of the image back to the source solid; as `forward`."""
+        return self.point_map.inverse(points).points
+
+    def coordinates(self, points: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Solid-torus coordinates (u, v, s) of (7.1).
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3), optional
+            Points of the source; its vertices if left out.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Angles u, v in [0, 2 pi) and the distance s from the centre circle; NaN outside.
+
+        Raises
+        ------
+        OptionError
+            If the map has no torus.
+        ArrayError, NonFiniteError
+            As `forward`.
+        """
+        if self.torus is None:
+            raise OptionError("the map has no torus, so there are no coordinates on it")
+        image = self.image if points is None else self.forward(points)
+        return read_only(np.stack(self.torus.coordinates(image), axis=-1))
+
+
+def _interpolate(
+    values: NDArray[np.float64],
+    T: NDArray[np.int32],
+    tets: NDArray[np.int32],
+    weights: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """A point outside has tet -1, any tet's corners, and weights NaN."""
+    corners = T[tets]
+    out = sum(
+        weights[:, k].reshape((-1,) + (1,) * (values.ndim - 1)) * values[corners[:, k]]
+        for k in range(4)
+    )
+    return np.asarray(out)

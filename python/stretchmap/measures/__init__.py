@@ -1,0 +1,1 @@
+"""How much a map distorts areas, volumes and angles."""

@@ -1,0 +1,179 @@
+"""Refining a solid where it is too coarse for a map: at its boundary, inside, along single edges.
+
+An interior edge or face whose vertices all lie on the boundary is placed by the boundary map alone,
+so no solver that works inside can repair a flip there. A vertex at its midpoint or centroid sets it
+free. Likewise, an interior vertex with a good part of the boundary round it may have no place from
+where it sees the inner side of all those faces; halving the edges from it to the boundary gives
+them vertices of their own to be seen by.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..base.arrays import read_only
+from ..errors import ArrayError
+from .meshes import TetMesh
+from .split_edges import TET_EDGES, split_edges
+
+__all__ = ["Refinement", "refine_boundary_joins"]
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """A solid without boundary joins, and the way back to the one it came from.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        Its first n vertices are those of the input, unchanged, and its boundary is the same. Then
+        follow the midpoints of ``parents``, the centroids of ``face_parents`` and the midpoints of
+        ``halved``.
+    parents : (a, 2) ndarray of int32
+        Vertices of the edge each added midpoint halves.
+    face_parents : (b, 3) ndarray of int32
+        Vertices of the face each added centroid lies in.
+    parent_tet : (k',) ndarray of int32
+        Input tet of each tet, ascending.
+    halved : tuple of (c, 2) ndarrays of int32
+        Edges halved after that, those of one pass in one array; their ends may have been added
+        before.
+    """
+
+    solid: TetMesh
+    parents: NDArray[np.int32]
+    face_parents: NDArray[np.int32]
+    parent_tet: NDArray[np.int32]
+    halved: tuple[NDArray[np.int32], ...] = ()
+
+    @property
+    def n_split(self) -> int:
+        """Number of edges and faces split: the number of added vertices."""
+        return sum(map(len, (self.parents, self.face_parents, *self.halved)))
+
+    @property
+    def n_added_tets(self) -> int:
+        """Number of tets beyond those of the input."""
+        return len(self.parent_tet) - (int(self.parent_tet[-1]) + 1)
+
+    def prolong(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Carry values over to the added vertices by averaging their parents.
+
+        Parameters
+        ----------
+        values : (n, ...) array_like of float
+            One row per vertex of the input.
+
+        Returns
+        -------
+        (n + n_split, ...) ndarray of float64
+            ``values`` first, unchanged.
+
+        Raises
+        ------
+        ArrayError
+            Another number of rows.
+        """
+        array = np.asarray(values, dtype=np.float64)
+        n = self.solid.n_vertices - self.n_split
+        if array.ndim == 0 or len(array) != n:
+            raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
+        rows: list[NDArray[Any]] = [array]
+        rows += [array[ids].mean(axis=1) for ids in (self.parents, self.face_parents) if len(ids)]
+        array = np.concatenate(rows)
+        for ids in self.halved:
+            array = np.concatenate([array, array[ids].mean(axis=1)])
+        return array
+
+    def halve(self, edges: NDArray[np.int32]) -> Refinement:
+        """Halve interior edges of ``solid``, with all tets round them; none may be left over.
+
+        Parameters
+        ----------
+        edges : (e, 2) ndarray of int32
+            Different interior edges of ``solid``. Of those with a tet in common, the first is
+            halved first.
+
+        Returns
+        -------
+        Refinement
+            Of the same input.
+        """
+        solid, parent, passes = self.solid, self.parent_tet, list(self.halved)
+        while len(edges):
+            split = split_edges(solid, edges, np.full(len(edges), 0.5))
+            order = np.argsort(parent[split.parent_tet], kind="stable")
+            parent = parent[split.parent_tet][order]
+            solid = TetMesh(split.solid.V, split.solid.T[order])
+            passes.append(read_only(edges[split.kept]))
+            edges = np.delete(edges, split.kept, axis=0)
+        return dataclasses.replace(
+            self, solid=solid, parent_tet=read_only(parent), halved=tuple(passes)
+        )
+
+
+def refine_boundary_joins(solid: TetMesh) -> Refinement:
+    """Split every interior edge and face whose vertices all lie on the boundary.
+
+    Each such edge is halved at its midpoint, with all tets round it; each such face whose edges lie
+    on the boundary is split into three at its centroid, with the two tets beside it. Orientation,
+    boundary and volume are kept. The result depends on the input only.
+
+    Parameters
+    ----------
+    solid : TetMesh
+
+    Returns
+    -------
+    Refinement
+        With `boundary_joins` of ``solid`` empty; ``solid`` is the input itself when there was
+        nothing to split.
+
+    Raises
+    ------
+    NonManifoldError
+        A face shared by more than two tets; ``ids`` are the tets.
+    DegenerateError
+        Tets that repeat a vertex; ``ids`` are the tets.
+    """
+    found = _core.Refinement(solid.V, solid.T)
+    joins = found.joins
+    split = len(joins.edges) + len(joins.faces)
+    return Refinement(
+        solid=TetMesh(found.points, found.tets) if split else solid,
+        parents=read_only(joins.edges),
+        face_parents=read_only(joins.faces),
+        parent_tet=read_only(found.parent_tet),
+    )
+
+
+def crowded_edges(solid: TetMesh, tets: NDArray[np.intp]) -> NDArray[np.int32]:
+    """Edges to halve so that the interior vertices of some tets see fewer faces of the boundary.
+
+    Parameters
+    ----------
+    solid : TetMesh
+        Without boundary joins.
+    tets : ndarray of intp
+
+    Returns
+    -------
+    (e, 2) ndarray of int32
+        The edges from each interior vertex of those tets to the boundary, in lexicographic order;
+        if there are none, the edges of those tets.
+    """
+    inside = solid.boundary_index < 0
+    stuck = np.zeros(solid.n_vertices, bool)
+    stuck[solid.T[tets]] = True
+    first, second = solid.edges.T
+    chosen = (stuck & inside)[first] & ~inside[second] | (stuck & inside)[second] & ~inside[first]
+    if chosen.any():
+        return np.ascontiguousarray(solid.edges[chosen])
+    own = np.sort(solid.T[tets][:, TET_EDGES].reshape(-1, 2), axis=1)
+    return np.unique(own, axis=0)

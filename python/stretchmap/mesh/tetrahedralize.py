@@ -1,0 +1,93 @@
+"""Filling a closed surface with tets by the optional package tetgen."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MissingDependencyError, OptionError, SolverError
+from .meshes import TetMesh, TriMesh
+
+__all__ = ["tetrahedralise"]
+
+
+def tetrahedralise(
+    surface: TriMesh, max_volume: float | None = None, quality: float = 1.4
+) -> TetMesh:
+    """Fill a closed surface with tets, the surface kept exactly as it is.
+
+    Parameters
+    ----------
+    surface : TriMesh
+        Closed, without self-intersections, faces outward, every vertex used. Its vertices are the
+        first of the result, in the same order; its faces are the boundary faces.
+    max_volume : float, optional
+        Largest tet volume aimed at; without it the size follows the surface.
+    quality : float
+        Largest ratio of circumradius to shortest edge aimed at, above 1. Near the surface both
+        aims may be missed, since the surface is not refined.
+
+    Raises
+    ------
+    MissingDependencyError
+        If the ``tetgen`` package is not installed.
+    OptionError
+        If ``max_volume`` or ``quality`` is out of range.
+    SolverError
+        If the surface cannot be filled, as when it crosses itself, or was changed.
+    """
+    if quality <= 1.0 or (max_volume is not None and max_volume <= 0.0):
+        raise OptionError("quality must be above 1 and max_volume positive")
+    if importlib.util.find_spec("tetgen") is None:
+        raise MissingDependencyError(
+            "filling a surface with tets needs tetgen: pip install 'stretchmap[mesh]'"
+        )
+    options: dict[str, Any] = {"minratio": quality}
+    if max_volume is not None:
+        options |= {"fixedvolume": True, "maxvolume": max_volume}
+    filled = _run_tetgen(surface, options)
+    solid = TetMesh(filled[0], filled[1], orient=True)
+    n = len(surface.V)
+    if not (
+        np.array_equal(solid.V[:n], surface.V)
+        and np.array_equal(solid.boundary_vertices, np.arange(n))
+        and len(solid.surface.F) == len(surface.F)
+    ):
+        raise SolverError("filling the surface with tets changed it")
+    return solid
+
+
+def _run_tetgen(
+    surface: TriMesh, options: dict[str, Any]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Points and tets; in a process of its own, since tetgen aborts the process on bad input."""
+    script = (
+        "import json, sys, numpy, tetgen\n"
+        "data = numpy.load('surface.npz')\n"
+        "filled = tetgen.TetGen(data['V'], data['F']).tetrahedralize(\n"
+        "    nobisect=True, quality=True, order=1, quiet=True, **json.loads(sys.argv[1]))\n"
+        "numpy.savez('solid.npz', V=filled[0], T=filled[1])\n"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
+        run = subprocess.run(
+            [sys.executable, "-c", script, json.dumps(options)],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+        )
+        if run.returncode != 0:
+            raise SolverError(
+                "the surface cannot be filled with tets; it may cross itself "
+                f"({(run.stderr.strip().splitlines() or ['tetgen gave up'])[-1]})"
+            )
+        with np.load(Path(folder, "solid.npz")) as solid:
+            return solid["V"], solid["T"]

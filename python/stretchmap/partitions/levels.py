@@ -1,0 +1,79 @@
+"""Levels at which a solid is cut."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from .. import _core
+from ..base.torus import TWO_PI
+from ..errors import OptionError, SolverError
+
+if TYPE_CHECKING:
+    pass
+from .cutting import Pieces
+
+
+def shares_of(fractions: int | Sequence[float]) -> NDArray[np.float64]:
+    if isinstance(fractions, (int, np.integer)):
+        if fractions < 2:
+            raise OptionError(f"a partition has at least two parts, got {fractions}")
+        return np.full(fractions, 1.0 / fractions)
+    shares = np.asarray(fractions, float)
+    if shares.ndim != 1 or len(shares) < 2:
+        raise OptionError("fractions must be a number of parts or one share for each of them")
+    if not (np.isfinite(shares).all() and (shares > 0.0).all() and abs(shares.sum() - 1.0) < 1e-9):
+        raise OptionError(f"fractions must be positive and sum to 1, got {shares.tolist()}")
+    return shares / shares.sum()
+
+
+def levels_of(
+    pieces: Pieces, axis: str, shares: NDArray[np.float64], start: float, of: str
+) -> NDArray[np.float64]:
+    """Levels that divide source or image as asked: p - 1 for s, p angles for u and v."""
+    if axis == "s":
+        volumes = pieces.volumes(of)
+        values = pieces.points[:, 7]
+
+        def below(level: float) -> float:
+            return _core.volume_below(pieces.T, volumes, values - level)
+
+        ends = (float(values.min()), float(values.max()))
+    else:
+        below = _sector_volume(pieces, axis, start, of)
+        volumes = pieces.volumes(of)
+        ends = (start, start + TWO_PI)
+    total = float(volumes.sum())
+    found = [_root(below, share * total, ends) for share in np.cumsum(shares)[:-1]]
+    return np.array(found if axis == "s" else [start, *found])
+
+
+def _sector_volume(pieces: Pieces, axis: str, start: float, of: str) -> Callable[[float], float]:
+    """Volume from the angle ``start`` up to another."""
+    halves = pieces.cut(pieces.sheet(axis, start)[0])
+    volumes = halves.volumes(of)
+    ahead = halves.side > 0
+    parts = [(np.ascontiguousarray(halves.T[m]), volumes[m]) for m in (ahead, ~ahead)]
+    first = float(parts[0][1].sum())
+
+    def below(angle: float) -> float:
+        values = np.ascontiguousarray(halves.sheet(axis, angle)[0])
+        if angle - start <= math.pi:
+            return _core.volume_below(*parts[0], values)
+        return first + _core.volume_below(*parts[1], values)
+
+    return below
+
+
+def _root(below: Callable[[float], float], target: float, ends: tuple[float, float]) -> float:
+    def excess(level: float) -> float:
+        return below(level) - target
+
+    if not excess(ends[0]) <= 0.0 <= excess(ends[1]):
+        raise SolverError("no level divides the image as asked; is the map certified?")
+    return float(brentq(excess, *ends, xtol=1e-15, rtol=4 * np.finfo(float).eps))

@@ -1,0 +1,255 @@
+"""Partition of a solid into parts of prescribed volume, section 7.2.
+
+Level surfaces of the solid-torus coordinates are pulled back to the source by cutting every tet
+they cross. On a tet the level function is linear:
+
+- ``u``: the half-plane at angle u through the axis, exact in the image;
+- ``v``: with A the piecewise-linear interpolant of ``hypot(x, y) - R``, the half-sheet where (A, z)
+  has the angle v; all sheets meet in the core A = z = 0;
+- ``s``: the interpolant of ``(s / r)^2``, which on the standard solid torus is the share of the
+  volume inside.
+
+The levels that divide the *image* as asked are found first. What the parts of the source then lack
+or have too much is the volume distortion of the map, reported as the uncorrected errors; they
+correspond to Table 7.1. One-dimensional root finding then moves each level until the source is
+divided as asked.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.arrays import read_only
+from ..base.tables import plain, table
+from ..errors import ArrayError, OptionError
+from ..mesh.meshes import TetMesh, TriMesh
+
+if TYPE_CHECKING:
+    from ..maps.result import MapResult
+from .cutting import Pieces, cut_all, part_volumes
+from .levels import levels_of, shares_of
+
+__all__ = ["Partition", "partition"]
+
+
+@dataclass(frozen=True, eq=False)
+class Partition:
+    """A solid cut into parts.
+
+    Attributes
+    ----------
+    by : tuple of str
+        Coordinates the levels belong to.
+    fractions : ndarray, shape (p,)
+        Share of the volume asked for each part.
+    solid : TetMesh
+        The source, cut; its first vertices are those of the source. Parts meet in whole faces.
+    image : ndarray, shape (n, 3)
+        Images of its vertices.
+    labels : ndarray of int32, shape (k,)
+        Part of each tet.
+    parent_tet : ndarray of int32, shape (k,)
+        Tet of the source each tet was cut from.
+    levels : tuple of ndarray
+        Per coordinate the levels of the cuts: angles in radians from ``start`` on, or values of
+        ``(s / r)^2``.
+    uncorrected_levels : tuple of ndarray
+        The levels that divide the image exactly.
+    volumes : ndarray, shape (p,)
+    errors : ndarray, shape (p,)
+        ``volume / (fraction total) - 1``.
+    uncorrected_errors : ndarray, shape (p,)
+        The same for the uncorrected levels.
+    cumulative_errors : ndarray, shape (p - 1,)
+        Uncorrected errors of the unions of the first 1, 2, ... parts, as in Table 7.1; empty for
+        several coordinates.
+    """
+
+    by: tuple[str, ...]
+    fractions: NDArray[np.float64]
+    solid: TetMesh
+    image: NDArray[np.float64]
+    labels: NDArray[np.int32]
+    parent_tet: NDArray[np.int32]
+    levels: tuple[NDArray[np.float64], ...]
+    uncorrected_levels: tuple[NDArray[np.float64], ...]
+    volumes: NDArray[np.float64]
+    errors: NDArray[np.float64]
+    uncorrected_errors: NDArray[np.float64]
+    cumulative_errors: NDArray[np.float64]
+
+    @property
+    def n_parts(self) -> int:
+        """Number of parts."""
+        return len(self.fractions)
+
+    def part(self, i: int) -> TetMesh:
+        """Part i as a mesh of its own.
+
+        Raises
+        ------
+        OptionError
+            If there is no such part.
+        """
+        return TetMesh(self.solid.V, self.solid.T[self._tets(i)]).compact()[0]
+
+    def surface(self, i: int) -> TriMesh:
+        """Closed boundary of part i, faces outward; raises as `part`."""
+        return self.part(i).surface
+
+    def interface(self, i: int, j: int) -> TriMesh:
+        """Faces that parts i and j share, looking out of part i; raises as `part`."""
+        first, second = (self._faces(p) for p in (i, j))
+        keys = [
+            np.sort(f, axis=1) @ (self.solid.n_vertices ** np.arange(3)) for f in (first, second)
+        ]
+        shared = np.isin(keys[0], keys[1])
+        if not shared.any():
+            return TriMesh(self.solid.V, np.zeros((0, 3), np.int32))
+        return TriMesh(self.solid.V, first[shared]).compact()[0]
+
+    def _tets(self, i: int) -> NDArray[np.bool_]:
+        if not 0 <= i < self.n_parts:
+            raise OptionError(f"there are parts 0 to {self.n_parts - 1}, not {i}")
+        return self.labels == i
+
+    def _faces(self, i: int) -> NDArray[np.int64]:
+        tets = np.ascontiguousarray(self.solid.T[self._tets(i)])
+        boundary = _core.TetBoundary(tets, self.solid.n_vertices)
+        return boundary.vertices[boundary.faces].astype(np.int64)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything scalar, JSON-compatible."""
+        names = ("by", "fractions", "levels", "volumes", "errors", "uncorrected_errors",
+                 "cumulative_errors")  # fmt: skip
+        return plain({name: getattr(self, name) for name in names})
+
+    def summary(self) -> str:
+        """A table of the parts."""
+        rows: dict[str, Any] = {
+            "parts": f"{self.n_parts} by {', '.join(self.by)}",
+            "volume": self.solid.volume,
+            "largest uncorrected error": float(np.abs(self.uncorrected_errors).max()),
+            "largest error": float(np.abs(self.errors).max()),
+        }
+        for i in range(self.n_parts):
+            rows[f"part {i}"] = (
+                f"{self.volumes[i]:.6g}  uncorrected {100 * self.uncorrected_errors[i]:+.4f} %"
+            )
+        return table(rows)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the cut mesh, with cell data ``part`` and ``parent_tet`` and point data ``image``.
+
+        Raises
+        ------
+        FileFormatError
+            If the suffix is unknown or the format cannot hold a tet mesh with data.
+        OSError
+            If the file cannot be written.
+        """
+        from .. import io
+
+        io.write(
+            path,
+            self.solid,
+            point_data={"image": self.image},
+            cell_data={"part": self.labels, "parent_tet": self.parent_tet},
+        )
+
+
+def partition(
+    result: MapResult,
+    fractions: int | Sequence[float] | tuple[int | Sequence[float], ...] = 5,
+    by: str | tuple[str, ...] = "s",
+    *,
+    start: float = 0.0,
+    correct: bool = True,
+) -> Partition:
+    """Divide a mapped solid into parts of prescribed volume.
+
+    Parameters
+    ----------
+    result : VolumeMap or LoadedMap
+        Map of a solid onto the solid torus.
+    fractions : int or sequence of float
+        Number of equal parts, or the share of each, summing to 1. With several coordinates a tuple,
+        one entry each.
+    by : {"s", "u", "v"} or tuple of them
+        Nested shells, sectors the long way round, sectors around the tube. Several make a grid; its
+        parts are numbered with the last coordinate running fastest. Only the shares along each
+        coordinate are then corrected, those of the cells keep the distortion of the map.
+    start : float
+        Angle in radians at which the first sector of ``u`` or ``v`` begins.
+    correct : bool
+        Move the levels until the source is divided exactly. False: cut at the uncorrected levels.
+
+    Returns
+    -------
+    Partition
+
+    Raises
+    ------
+    OptionError
+        If an option is out of range or the map has no torus.
+    ArrayError
+        If the map is that of a surface.
+    SolverError
+        If the image has no volume to be divided.
+    """
+    axes = (by,) if isinstance(by, str) else tuple(by)
+    wanted = (fractions,) if isinstance(by, str) else tuple(fractions)  # type: ignore[arg-type]
+    if not axes or len(set(axes)) != len(axes) or any(axis not in ("s", "u", "v") for axis in axes):
+        raise OptionError(f"by must name each of 's', 'u', 'v' at most once, got {by!r}")
+    if len(wanted) != len(axes):
+        raise OptionError(f"{len(axes)} coordinates need as many fractions, got {len(wanted)}")
+    if not math.isfinite(start):
+        raise OptionError(f"start must be finite, got {start}")
+    shares = [shares_of(entry) for entry in wanted]
+    if not hasattr(result.mesh, "T"):
+        raise ArrayError("only the map of a solid can be partitioned, this is that of a surface")
+    if result.torus is None:
+        raise OptionError("the map has no torus, so there are no coordinates on it")
+
+    pieces = Pieces.of(result.mesh, result.image, result.torus)
+    uncorrected = [
+        levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)
+    ]
+    levels = uncorrected
+    if correct:
+        levels = [
+            levels_of(pieces, a, p, start, "source") for a, p in zip(axes, shares, strict=True)
+        ]
+    raw = part_volumes(*cut_all(pieces, axes, uncorrected), shares)
+    cut, labels = cut_all(pieces, axes, levels)
+    solid = TetMesh(cut.points[:, :3], cut.T)
+    asked = np.ones(1)
+    for share in shares:
+        asked = np.multiply.outer(asked, share).ravel()
+    volumes = np.bincount(labels, solid.tet_volumes, minlength=len(asked))
+    total = result.mesh.volume
+    running = np.cumsum(asked)[:-1]
+    return Partition(
+        by=axes,
+        fractions=read_only(asked),
+        solid=solid,
+        image=read_only(np.ascontiguousarray(cut.points[:, 3:6])),
+        labels=read_only(labels),
+        parent_tet=read_only(cut.parent),
+        levels=tuple(levels),
+        uncorrected_levels=tuple(uncorrected),
+        volumes=read_only(volumes),
+        errors=read_only(volumes / (asked * total) - 1.0),
+        uncorrected_errors=read_only(raw / (asked * total) - 1.0),
+        cumulative_errors=read_only(
+            np.cumsum(raw)[:-1] / (running * total) - 1.0 if len(axes) == 1 else np.zeros(0)
+        ),
+    )

@@ -1,0 +1,175 @@
+"""Linear homotopy between a solid and its image, as numbered frames or an animated picture."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core, io
+from ..base.arrays import read_only
+from ..base.files import atomic_path
+from ..base.tables import plain, table
+from ..errors import FileFormatError, OptionError
+from ..mesh.meshes import TetMesh
+
+if TYPE_CHECKING:
+    from ..maps.result import MapResult
+
+__all__ = ["Morph", "morph"]
+
+
+@dataclass(frozen=True, eq=False)
+class Morph:
+    """The straight way of every vertex from source to image.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        The source.
+    image : ndarray, shape (n, 3)
+        Turned, shifted and scaled onto the source as well as a similarity can, if asked for.
+    times : ndarray, shape (f,)
+        From 0 (source) to 1 (image).
+    flips : ndarray of int, shape (f,)
+        Tets that are not positive in each frame. Both ends may be free of them and the way between
+        not: nothing protects a linear homotopy.
+    """
+
+    solid: TetMesh
+    image: NDArray[np.float64]
+    times: NDArray[np.float64]
+    flips: NDArray[np.intp]
+
+    def frame(self, i: int) -> NDArray[np.float64]:
+        """(n, 3) vertices of frame i."""
+        t = self.times[i]
+        return (1.0 - t) * self.solid.V + t * self.image
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures, JSON-compatible."""
+        return plain({"frames": len(self.times), "most_flips": int(self.flips.max())})
+
+    def summary(self) -> str:
+        """A table of the figures."""
+        return table(self.to_dict())
+
+    def save(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Write ``.pvd`` with one ``.vtu`` per frame beside it, or an animated ``.gif``.
+
+        Returns
+        -------
+        list of Path
+            Every file written.
+
+        Raises
+        ------
+        FileFormatError
+            Another suffix.
+        MissingDependencyError
+            meshio (frames) or matplotlib and pillow (picture) are not installed.
+        OSError
+            If a file cannot be written.
+        """
+        path = Path(path)
+        suffix = path.suffix.lower()
+        if suffix == ".pvd":
+            return self._save_frames(path)
+        if suffix == ".gif":
+            return self._save_picture(path)
+        raise FileFormatError(f"{path}: a morph is written as .pvd or .gif")
+
+    def _save_frames(self, path: Path) -> list[Path]:
+        frames = [path.with_name(f"{path.stem}_{i:03d}.vtu") for i in range(len(self.times))]
+        lines = [
+            f'    <DataSet timestep="{t:.6g}" file={quoteattr(frame.name)}/>'
+            for t, frame in zip(self.times, frames, strict=True)
+        ]
+        text = "\n".join(
+            ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>",
+             *lines, "  </Collection>", "</VTKFile>", ""]
+        )  # fmt: skip
+        with ExitStack() as stack:
+            # The frames appear together, once all of them are written.
+            for i, frame in enumerate(frames):
+                temporary = stack.enter_context(atomic_path(frame))
+                io.write(temporary, TetMesh(self.frame(i), self.solid.T))
+            with atomic_path(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+        return [*frames, path]
+
+    def _save_picture(self, path: Path) -> list[Path]:
+        from .painting import Scene
+        from .style import along, broad_view, empty_figure
+
+        figure = empty_figure(5.0, 4.6)
+        from matplotlib.animation import FuncAnimation, PillowWriter
+
+        axes = figure.add_subplot()
+        ids, faces = self.solid.boundary_vertices, self.solid.surface.F
+        start = self.solid.V[ids]
+        around = np.concatenate([start, self.image[ids]])
+        colours = along(start[faces].mean(axis=1), start)
+
+        def draw(i: int) -> list[Any]:
+            axes.clear()
+            scene = Scene(broad_view(start))
+            scene.add_faces(self.frame(i)[ids][faces], colours)
+            scene.draw(axes, around)
+            return [axes.set_title(f"t = {self.times[i]:.2f}", fontsize=10)]
+
+        # There and back, so that the end meets the beginning.
+        order = [*range(len(self.times)), *range(len(self.times) - 2, 0, -1)]
+        animation = FuncAnimation(figure, draw, frames=order)
+        with atomic_path(path) as temporary:
+            animation.save(temporary, writer=PillowWriter(fps=12))
+        return [path]
+
+
+def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
+    """Linear homotopy ``(1 - t) x + t f(x)`` from a solid to its image.
+
+    Parameters
+    ----------
+    result : Registration, VolumeMap or LoadedMap
+        Map of a solid.
+    frames : int
+        Number of frames, both ends included, at least 2.
+    align : bool
+        Turn, shift and scale the image onto the source first (least squares, no reflection); else
+        the solid travels and turns on its way.
+
+    Returns
+    -------
+    Morph
+
+    Raises
+    ------
+    OptionError
+        Fewer than two frames, the map of a surface, or an image that is a single point.
+    """
+    solid = result.mesh
+    if not isinstance(solid, TetMesh):
+        raise OptionError("only the map of a solid can be morphed, this is that of a surface")
+    if frames < 2:
+        raise OptionError(f"a morph has at least two frames, got {frames}")
+    image = np.asarray(result.image)
+    if not np.ptp(image, axis=0).any():
+        raise OptionError("the image is a single point")
+    if align:
+        from ..registration.landmarks import similarity
+
+        rotation, scale, shift = similarity(image, solid.V)
+        image = scale * image @ rotation + shift
+    times = np.linspace(0.0, 1.0, frames)
+    flips = [
+        int((~(_core.signed_tet_volumes((1.0 - t) * solid.V + t * image, solid.T) > 0.0)).sum())
+        for t in times
+    ]
+    return Morph(solid, read_only(image), read_only(times), read_only(np.array(flips)))

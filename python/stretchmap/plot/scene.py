@@ -1,0 +1,170 @@
+"""Scenes of maps in three dimensions, by the optional package PyVista.
+
+Every function returns a ``pyvista.Plotter`` that has not been shown: call ``show()`` to turn it
+about with the mouse, or `save` for a picture. `stretchmap.plot` draws these and more by matplotlib
+alone.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.files import atomic_path
+from ..errors import ArrayError, FileFormatError, MissingDependencyError, OptionError
+from ..maps.result import MapResult
+from ..mesh.meshes import TetMesh, TriMesh
+from .style import principal
+
+if TYPE_CHECKING:
+    import pyvista
+
+__all__ = ["cut", "loops", "save"]
+
+_COLOURS = {"coordinate": ("viridis", None), "ratio": ("cividis", (0.5, 1.5))}
+
+
+def cut(
+    result: MapResult, colour: str = "coordinate", *, off_screen: bool = True
+) -> pyvista.Plotter:
+    """The solid torus, cut open by a plane through its axis.
+
+    Parameters
+    ----------
+    result : MapResult
+        A map of a solid.
+    colour : {"coordinate", "ratio"}
+        By the position along the longest axis of the source, or by the volume ratio of each tet.
+    off_screen : bool
+        Draw without a window.
+
+    Returns
+    -------
+    pyvista.Plotter
+
+    Raises
+    ------
+    ArrayError
+        The map is one of a surface.
+    OptionError
+        Another colour.
+    MissingDependencyError
+        PyVista is not installed.
+    """
+    if not isinstance(result.mesh, TetMesh):
+        raise ArrayError("a cut needs the map of a solid, this is one of a surface")
+    if colour not in _COLOURS:
+        raise OptionError(f"colour must be one of {', '.join(_COLOURS)}, got {colour!r}")
+    pv = _pyvista()
+    grid = pv.UnstructuredGrid({pv.CellType.TETRA: result.mesh.T}, np.asarray(result.image))
+    place = principal(result.mesh.V, result.mesh.V)[:, 0]
+    grid.point_data["coordinate"] = place
+    grid.cell_data["ratio"] = result.distortion.ratios
+    half = grid.clip("y", origin=(0.0, 0.0, 0.0), invert=False)
+    table, limits = _COLOURS[colour]
+    plotter = pv.Plotter(off_screen=off_screen)
+    # The line break keeps the title off the numbers below it.
+    title = ("place in the source" if colour == "coordinate" else "volume ratio") + "\n"
+    plotter.add_mesh(
+        half, scalars=colour, cmap=table, clim=limits or (place.min(), place.max()), ambient=0.3,
+        scalar_bar_args={"title": title, "position_x": 0.2, "position_y": 0.01, "height": 0.11},
+    )  # fmt: skip
+    _look(plotter)
+    return plotter
+
+
+def loops(mesh: TriMesh | TetMesh, *, off_screen: bool = True) -> pyvista.Plotter:
+    """A surface, half transparent, with its shortest handle loops and tunnel loops.
+
+    Parameters
+    ----------
+    mesh : TriMesh or TetMesh
+        Of any genus; of a solid its boundary.
+    off_screen : bool
+        Draw without a window.
+
+    Returns
+    -------
+    pyvista.Plotter
+
+    Raises
+    ------
+    MeshError
+        As `homology_basis`.
+    MissingDependencyError
+        PyVista is not installed.
+    """
+    from ..homology.basis import homology_basis
+
+    pv = _pyvista()
+    solid = mesh if isinstance(mesh, TetMesh) else None
+    surface = mesh.surface if isinstance(mesh, TetMesh) else mesh
+    basis = homology_basis(surface, solid)
+    plotter = pv.Plotter(off_screen=off_screen)
+    faces = pv.PolyData.from_regular_faces(surface.V, surface.F)
+    plotter.add_mesh(faces, color="#DDDDDD", opacity=0.6, smooth_shading=True)
+    families = [("handle", "#D55E00", basis.handle_loops)]
+    if basis.tunnel_classes is not None:
+        families.append(("tunnel", "#0072B2", basis.tunnel_loops))
+    for name, shade, found in families:
+        for loop in found:
+            plotter.add_mesh(
+                _ring(pv, surface.V[loop]), color=shade, line_width=9, label=f"{name} loop",
+                render_lines_as_tubes=True,
+            )  # fmt: skip
+    plotter.add_legend(bcolor="white", size=(0.2, 0.08 * len(families)))
+    _look(plotter)
+    return plotter
+
+
+def save(plotter: pyvista.Plotter, path: str | os.PathLike[str]) -> None:
+    """Write a scene as a picture (``.png``) that appears whole or not at all.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+        Closed afterwards.
+    path : path-like
+
+    Raises
+    ------
+    FileFormatError
+        Another suffix.
+    OSError
+        The file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise FileFormatError(f"{path}: scenes are saved as .png")
+    with atomic_path(path) as temporary:
+        plotter.screenshot(str(temporary))
+    plotter.close()
+
+
+def _ring(pv: Any, points: NDArray[np.float64]) -> Any:
+    k = len(points)
+    line = np.concatenate([[k + 1], np.arange(k), [0]])
+    return pv.PolyData(points, lines=line)
+
+
+def _look(plotter: Any) -> None:
+    plotter.set_background("white")
+    plotter.camera_position = "xz"
+    plotter.camera.elevation = 35.0
+    plotter.camera.azimuth = -20.0
+    plotter.reset_camera()
+    plotter.camera.zoom(1.1)
+
+
+def _pyvista() -> Any:
+    try:
+        import pyvista
+    except ImportError as error:
+        raise MissingDependencyError(
+            "scenes need PyVista: pip install 'stretchmap[viz]'"
+        ) from error
+    return pyvista

@@ -1,0 +1,1 @@
+"""Maps of one solid torus onto another, landmarks to landmarks."""

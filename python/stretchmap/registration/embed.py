@@ -1,0 +1,227 @@
+"""Refining a boundary where it is too coarse for the map prescribed on it.
+
+The image's vertices lie on the target's surface, but its triangles are flat. Where the map bends
+sharply inside a triangle, the flat one may be turned over in the target's flat torus; where the
+target folds sharply between them, or is thinner than they are bent, two may cross. Such triangles
+are refined, crossing ones where their image leaves the surface most. The new vertices lie on the
+surface too, so the image follows it more and more closely there; nothing changes elsewhere. If that
+does not help, such triangles are cut along the edges of the target instead (`_overlay`), until they
+do not cross any more, at the latest when they lie on its surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.split_edges import split_edges
+from .flat_torus import FlatSurface, wrapped
+from .match import SurfaceProblem
+from .overlay import overlay_splits
+
+_ROUNDS = 40
+_PATIENCE = 6  # rounds that do not lower the number of crossings
+_MOST_TIMES = 20  # crossings may multiply along target edges before they vanish, but not so much
+_MOST_PAIRS = 10_000
+_NEAR, _SETTLE = 2, 10  # rings of vertices that make room for new ones, and how often each moves
+_MOST_ADDED = 0.5  # as a share of the boundary's vertices
+# Of an edge: its ends, and where it may be split.
+_SHARES = np.concatenate([[0.0], np.linspace(0.1, 0.9, 17), [1.0]])
+
+
+def unfold_boundary(
+    source: TetMesh,
+    y: NDArray[np.float64],
+    bend: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+) -> tuple[TetMesh, NDArray[np.float64], NDArray[np.intp]]:
+    """Split boundary edges of the source until a map of the flat torus turns no face over.
+
+    Parameters
+    ----------
+    source : TetMesh
+    y : ndarray, shape (nb, 2)
+        Each boundary vertex in the flat torus, free of folds, faces smaller than half a turn.
+    bend : callable
+        One-to-one map (n, 2) -> (n, 2) of the flat torus, no farther than half a turn.
+
+    Returns
+    -------
+    solid : TetMesh
+        The source, refined.
+    bent : ndarray, shape (nb', 2)
+        Each boundary vertex of it after the map.
+    folded : ndarray of intp
+        Faces that are still turned over.
+    """
+    solid = source
+    for _ in range(_ROUNDS):
+        F, bent = solid.surface.F, bend(y)
+        sides = wrapped(bent[F[:, 1:]] - bent[F[:, :1]])
+        folded = np.flatnonzero(~(np.linalg.det(sides) > 0.0))
+        if not len(folded) or len(y) > (1.0 + _MOST_ADDED) * source.surface.n_vertices:
+            break
+        edges, shares, where = _worst_edges(F[folded], y, bend)
+        split = split_edges(solid, solid.boundary_vertices[edges], shares)
+        solid, y = split.solid, np.concatenate([y, where[split.kept]])
+    return solid, bent, folded
+
+
+@dataclass(frozen=True)
+class EmbeddedBoundary:
+    """What `embed_boundary` leaves behind.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        The source, boundary edges split where that was needed; the first vertices are its own.
+    points : ndarray, shape (nb, 3)
+        Image of each of its boundary vertices, on the target's surface.
+    crossings : ndarray of int32, shape (c, 2)
+        Empty; or, if refinement did not help, the pairs of boundary faces whose images cross in the
+        source as it was given, which is then returned.
+    """
+
+    solid: TetMesh
+    points: NDArray[np.float64]
+    crossings: NDArray[np.int32]
+
+
+def embed_boundary(
+    source: TetMesh,
+    target: FlatSurface,
+    y: NDArray[np.float64],
+    points: NDArray[np.float64],
+    held: NDArray[np.int32],
+) -> EmbeddedBoundary:
+    """Split boundary edges of the source until the images of its boundary faces do not cross.
+
+    Parameters
+    ----------
+    source : TetMesh
+    target : FlatSurface
+    y : ndarray, shape (nb, 2)
+        Image of each boundary vertex in the target's flat torus, free of folds, faces smaller than
+        half a turn.
+    points : ndarray, shape (nb, 3)
+        The same on the target's surface.
+    held : ndarray of int32
+        Boundary vertices that stay where they are: landmarks.
+    """
+    crossings = _core.crossing_faces(points, source.surface.F, _MOST_PAIRS)
+    start = EmbeddedBoundary(source, points, crossings)
+    for way in (_follow, _overlay):
+        if not len(crossings):
+            break
+        result = way(start, target, y, held)
+        if not len(result.crossings):
+            return result
+    return start
+
+
+def _follow(
+    start: EmbeddedBoundary,
+    target: FlatSurface,
+    y: NDArray[np.float64],
+    held: NDArray[np.int32],
+) -> EmbeddedBoundary:
+    """New vertices where edges of crossing faces leave the surface most, and room made for them."""
+    solid, at, images, crossings = start.solid, y, start.points, start.crossings
+    fewest, since = len(crossings), 0
+    while len(crossings) and since < _PATIENCE and len(at) < (1.0 + _MOST_ADDED) * len(y):
+        bad = solid.surface.F[np.unique(crossings)]
+        edges, shares, where = _worst_edges(bad, at, target.points)
+        split = split_edges(solid, solid.boundary_vertices[edges], shares)
+        solid, where = split.solid, where[split.kept]
+        at = np.concatenate([at, where])
+        images = np.concatenate([images, target.points(where)])
+        at, images = _settled(solid.surface, target, at, images, held, len(where))
+        crossings = _core.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
+        since = 0 if len(crossings) < fewest else since + 1
+        fewest = min(fewest, len(crossings))
+    return EmbeddedBoundary(solid, images, crossings)
+
+
+def _overlay(
+    start: EmbeddedBoundary,
+    target: FlatSurface,
+    y: NDArray[np.float64],
+    held: NDArray[np.int32],
+) -> EmbeddedBoundary:
+    """New vertices where crossing faces meet vertices and edges of the target; all others stay."""
+    solid, at, images, crossings = start.solid, y, start.points, start.crossings
+    most = min(_MOST_PAIRS - 1, _MOST_TIMES * len(crossings))
+    for _ in range(_ROUNDS):
+        enough = len(crossings) > most or len(at) > (1.0 + _MOST_ADDED) * len(y)
+        if enough or not len(crossings):
+            break
+        edges, shares, where = overlay_splits(
+            solid.surface, target, at, images, np.unique(crossings)
+        )
+        if not len(edges):
+            break
+        split = split_edges(solid, solid.boundary_vertices[edges], shares)
+        solid, where = split.solid, where[split.kept]
+        at = np.concatenate([at, where])
+        images = np.concatenate([images, target.points(where)])
+        crossings = _core.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
+    return EmbeddedBoundary(solid, images, crossings)
+
+
+def _settled(
+    surface: TriMesh,
+    target: FlatSurface,
+    y: NDArray[np.float64],
+    points: NDArray[np.float64],
+    held: NDArray[np.int32],
+    n_new: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The last ``n_new`` vertices and those near them moved for less distortion, one by one.
+
+    What is straight in the flat torus is crooked on the surface; left there, the new vertices would
+    make the image more crooked, not less.
+    """
+    edges = surface.edges
+    loose = np.zeros(len(y), bool)
+    loose[-n_new:] = True
+    for _ in range(_NEAR):
+        loose[edges[loose[edges].any(axis=1)]] = True
+    loose[held] = False
+    problem = SurfaceProblem(FlatSurface.at(surface, y), target)
+    problem.held = ~loose
+    for _ in range(_SETTLE):
+        y, points = problem.one_by_one(y, points)
+    return y, points
+
+
+def _worst_edges(
+    F: NDArray[np.int32],
+    y: NDArray[np.float64],
+    place: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+    """The edge of each face whose image under ``place`` strays most from its chord, and where.
+
+    Returns edges (e, 2), worst first and none twice; shares (e,) of the way from their first end;
+    positions (e, 2) in the flat torus.
+    """
+    edges = np.sort(F[:, [[0, 1], [1, 2], [2, 0]]], axis=2)  # (m, 3, 2)
+    start = y[edges[..., 0]][:, :, None]
+    way = start + _SHARES[:, None] * wrapped(y[edges[..., 1]][:, :, None] - start)
+    there = place(way.reshape(-1, 2)).reshape(*way.shape[:3], -1)
+    first, last = there[:, :, :1], there[:, :, -1:]
+    strays = np.linalg.norm(there - first - _SHARES[:, None] * (last - first), axis=3)
+    lengths = np.linalg.norm(last - first, axis=3)[..., 0]
+    # An edge that follows the surface gives way to a long one.
+    score = strays.max(axis=2) + 1e-6 * lengths
+    rows, side = np.arange(len(F)), np.argmax(score, axis=1)
+    straight = strays[rows, side].max(axis=1) <= 1e-9 * lengths[rows, side]
+    found = np.where(straight, len(_SHARES) // 2, np.argmax(strays[rows, side], axis=1))
+    order = np.argsort(-score[rows, side], kind="stable")
+    chosen = edges[rows, side][order]
+    _, once = np.unique(chosen, axis=0, return_index=True)
+    keep = order[np.sort(once)]
+    return edges[keep, side[keep]], _SHARES[found[keep]], way[keep, side[keep], found[keep]]

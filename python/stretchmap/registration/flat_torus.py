@@ -1,0 +1,280 @@
+"""The flat torus of a surface, and the choice of how two of them lie on each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .. import _core
+from ..conformal.map import conformal_map
+from ..errors import SolverError
+from ..mesh.meshes import TriMesh
+
+_SEM_STEPS = 10
+_FLAT_STEPS, _FLAT_SHORTEST, _FLAT_TOL = 30, 1e-4, 1e-3
+_GRID = 20  # shifts tried along either coordinate
+_SAMPLE = 300  # vertices the rigid fit is judged by
+
+
+def wrapped(way: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The shortest way on the flat torus that ends where ``way`` does."""
+    return way - np.round(way)
+
+
+@dataclass(frozen=True, eq=False)
+class FlatSurface:
+    """A genus-one surface with coordinates on the unit flat torus.
+
+    Neither areas nor angles are true, but together they are distorted as little as can be, and no
+    face is squeezed.
+
+    Attributes
+    ----------
+    surface : TriMesh
+    forms : ndarray of int32, shape (2, e)
+        Integer closed 1-forms of the coordinates, as in `ConformalMap`.
+    turns : ndarray, shape (n, 2)
+    """
+
+    surface: TriMesh
+    forms: NDArray[np.int32]
+    turns: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, surface: TriMesh) -> FlatSurface:
+        """Conformal map, stretch energy minimisation (Algorithm 4.1) in the flat torus, and Newton
+        steps on the distortion of area and shape (``flat_value``).
+
+        Of the iterates of Algorithm 4.1 the one with the least ``sum |f| (ratio + 1 / ratio)`` is
+        taken. By itself it will not do: faces may nearly collapse in it, and near those what is
+        straight in the flat torus is crooked on the surface.
+
+        Raises
+        ------
+        MeshError, SolverError
+            As `conformal_map`.
+        """
+        conformal = conformal_map(surface)
+        chart = _core.SurfaceChart(surface.topology, conformal.forms)
+        sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, conformal.turns)
+        shares = surface.face_areas / surface.area
+        best, turns = math.inf, sem.turns
+        for _ in range(_SEM_STEPS + 1):
+            # Stretch energy does not mind a face that collapses, this measure does.
+            areas = _core.turn_areas(chart, np.ascontiguousarray(sem.turns))
+            ratio = np.maximum(areas / shares, 1e-300)
+            value = float((shares * (ratio + 1.0 / ratio)).sum())
+            if value < best:
+                best, turns = value, sem.turns.copy()
+            sem.step()
+        turns = _least_distorted(surface, chart, conformal.lattice, np.ascontiguousarray(turns))
+        return cls(surface, conformal.forms, turns)
+
+    @classmethod
+    def at(cls, surface: TriMesh, turns: NDArray[np.float64]) -> FlatSurface:
+        """The surface where ``turns`` (n, 2) puts it, every edge shorter than half a turn."""
+        edges = surface.edges
+        forms = -np.round(turns[edges[:, 1]] - turns[edges[:, 0]]).T
+        return cls(surface, np.ascontiguousarray(forms, np.int32), np.ascontiguousarray(turns))
+
+    def changed(self, gauge: Gauge) -> FlatSurface:
+        """The same surface in coordinates changed by a gauge."""
+        matrix = gauge.matrix
+        forms = np.ascontiguousarray(matrix @ self.forms, np.int32)
+        turns = self.turns @ matrix.T + gauge.shift
+        return FlatSurface(self.surface, forms, np.ascontiguousarray(turns))
+
+    @cached_property
+    def chart(self) -> _core.SurfaceChart:
+        """Whole turns between the corners of each face (core object)."""
+        return _core.SurfaceChart(self.surface.topology, self.forms)
+
+    @cached_property
+    def locator(self) -> _core.ChartLocator:
+        return _core.ChartLocator(self.chart, self.turns)
+
+    def locate(self, y: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Face and barycentric coordinates of points of the flat torus, (n, 2) in turns.
+
+        Raises
+        ------
+        SolverError
+            If a point lies in no face: the chart is folded there.
+        """
+        faces, weights = self.locator.locate(np.ascontiguousarray(y))
+        lost = np.flatnonzero(faces < 0)
+        if len(lost):
+            raise SolverError(f"{len(lost)} points lie in no face: the flat chart is folded", lost)
+        return faces, weights
+
+    def points(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) points of the surface at (n, 2) points of the flat torus."""
+        faces, weights = self.locate(y)
+        corners = self.surface.V[self.surface.F[faces]]
+        return np.ascontiguousarray(np.einsum("ij,ijk->ik", weights, corners))
+
+    def slopes(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 6) derivatives of `points`, averaged over the faces at each vertex so that they are
+        continuous; row-major 3x2 matrices."""
+        faces, weights = self.locate(y)
+        return np.ascontiguousarray(
+            np.einsum("ij,ijk->ik", weights, self._vertex_slopes[self.surface.F[faces]])
+        )
+
+    @cached_property
+    def face_slopes(self) -> NDArray[np.float64]:
+        """(m, 6) derivatives of `points` in each face; row-major 3x2 matrices."""
+        F, V = self.surface.F, self.surface.V
+        shift = np.stack([self.chart.shift_u, self.chart.shift_v], axis=-1)
+        flat = self.turns[F] + shift
+        flat_edges = np.stack([flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]], axis=-1)
+        edges = np.stack([V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]], axis=-1)
+        return np.ascontiguousarray((edges @ np.linalg.inv(flat_edges)).reshape(-1, 6))
+
+    @cached_property
+    def _vertex_slopes(self) -> NDArray[np.float64]:
+        F, V = self.surface.F, self.surface.V
+        slopes = self.face_slopes
+        area = self.surface.face_areas
+        ring = np.bincount(F.ravel(), np.repeat(area, 3), minlength=len(V))
+        sums = [
+            np.bincount(F.ravel(), np.repeat(area * column, 3), minlength=len(V))
+            for column in slopes.T
+        ]
+        return np.stack(sums, axis=1) / ring[:, None]
+
+
+def _least_distorted(
+    surface: TriMesh,
+    chart: _core.SurfaceChart,
+    lattice: NDArray[np.float64],
+    turns: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Projected Newton steps on ``flat_value``; the start is returned if it is folded."""
+    periods = np.ascontiguousarray(lattice.T / math.sqrt(abs(np.linalg.det(lattice))))
+    rest = _core.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
+    weights = surface.face_areas / surface.area
+    energy = _core.flat_value(chart, turns, periods, rest, weights)
+    for _ in range(_FLAT_STEPS if math.isfinite(energy) else 0):
+        gradient, hessian = _core.flat_model(chart, turns, periods, rest, weights)
+        step, alpha = damped_solve(gradient, hessian).reshape(-1, 2), 1.0
+        while alpha > _FLAT_SHORTEST:
+            moved = turns + alpha * step
+            value = _core.flat_value(chart, moved, periods, rest, weights)
+            if value < energy:
+                break
+            alpha *= 0.5
+        else:
+            break
+        small = energy - value <= _FLAT_TOL * energy
+        turns, energy = moved, value
+        if small:
+            break
+    return turns
+
+
+def damped_solve(gradient: NDArray[np.float64], hessian: sp.csr_matrix) -> NDArray[np.float64]:
+    """Newton step for a Hessian that is positive semi-definite only."""
+    diagonal = hessian.diagonal()
+    matrix = (hessian + sp.diags(1e-6 * diagonal + 1e-12 * diagonal.mean())).tocsr()
+    matrix.sort_indices()
+    solver = _core.SpdSolver(matrix, "direct")
+    step, _ = solver.solve(-gradient[:, None], np.zeros((len(gradient), 1)), must_converge=False)
+    return np.asarray(step[:, 0])
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """How the flat torus of the source is laid on that of the target.
+
+    ``(u, v) -> (sign u, sign v + twist u) + shift``: whatever keeps orientation and meridian.
+
+    Attributes
+    ----------
+    sign : int
+        1, or -1 if both directions are reversed.
+    twist : int
+        Dehn twists: meridians added to the longitude.
+    shift : tuple of float
+        In turns.
+    residual : float
+        Root mean square misfit the gauge was chosen by, as a share of the target's diagonal.
+    rule : str
+        ``"landmarks"`` or ``"rigid fit"``.
+    """
+
+    sign: int
+    twist: int
+    shift: tuple[float, float]
+    residual: float
+    rule: str
+
+    @property
+    def matrix(self) -> NDArray[np.int32]:
+        """The change of coordinates, (2, 2), determinant 1."""
+        return np.array([[self.sign, 0], [self.twist, self.sign]], np.int32)
+
+
+def choose_gauge(
+    source: FlatSurface, target: FlatSurface, landmarks: NDArray[np.int32] | None
+) -> Gauge:
+    """Gauge with the least misfit.
+
+    With three or more landmarks, surface vertex ids (k, 2), the misfit is the distance of their
+    images from where they belong. Without, it is what remains between vertices and their images
+    after the best similarity (rotation without reflection, translation, scale): two bones of one
+    kind fit well in the right gauge only.
+    """
+    use_landmarks = landmarks is not None and len(landmarks) >= 3
+    if use_landmarks:
+        assert landmarks is not None
+        ids, goals = landmarks[:, 0], target.surface.V[landmarks[:, 1]]
+    else:
+        step = max(1, source.surface.n_vertices // _SAMPLE)
+        ids, goals = np.arange(0, source.surface.n_vertices, step), None
+    size = float(np.linalg.norm(np.ptp(target.surface.V, axis=0)))
+    grid = np.stack(np.meshgrid(*[np.arange(_GRID) / _GRID] * 2, indexing="ij"), -1).reshape(-1, 2)
+
+    def misfits(sign: int, twist: int, shifts: NDArray[np.float64]) -> NDArray[np.float64]:
+        matrix = np.array([[sign, 0], [twist, sign]])
+        y = (source.turns[ids] @ matrix.T)[None] + shifts[:, None]
+        images = target.points(y.reshape(-1, 2)).reshape(len(shifts), len(ids), 3)
+        if goals is not None:
+            return np.sqrt(((images - goals) ** 2).sum(axis=2).mean(axis=1))
+        return _similarity_misfits(source.surface.V[ids], images)
+
+    best = (np.inf, 1, 0, np.zeros(2))
+    for sign in (1, -1):
+        for twist in (-1, 0, 1):
+            values = misfits(sign, twist, grid)
+            i = int(np.argmin(values))
+            if values[i] < best[0]:
+                best = (float(values[i]), sign, twist, grid[i])
+    value, sign, twist, shift = best
+    width = 1.0 / _GRID
+    offsets = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], indexing="ij"), -1).reshape(-1, 2)
+    while width > 1e-3:
+        width *= 0.5
+        values = misfits(sign, twist, shift + width * offsets)
+        i = int(np.argmin(values))
+        value, shift = float(values[i]), shift + width * offsets[i]
+    rule = "landmarks" if use_landmarks else "rigid fit"
+    return Gauge(sign, twist, (float(shift[0]), float(shift[1])), value / size, rule)
+
+
+def _similarity_misfits(
+    points: NDArray[np.float64], images: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Misfit of points (k, 3) and each of the images (c, k, 3) after the best similarity."""
+    p = points - points.mean(axis=0)
+    q = images - images.mean(axis=1, keepdims=True)
+    U, S, W = np.linalg.svd(np.einsum("ki,ckj->cij", p, q))
+    S[:, 2] *= np.sign(np.linalg.det(U @ W))
+    scale = S.sum(axis=1) / (p**2).sum()
+    left = (q**2).sum(axis=(1, 2)) - scale * S.sum(axis=1)
+    return np.sqrt(np.maximum(left, 0.0) / len(points))

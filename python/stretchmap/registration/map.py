@@ -1,0 +1,341 @@
+"""Registration of two solid tori, section 7.1: a volume-preserving map that takes landmarks to
+landmarks.
+
+The boundaries are laid on each other through their flat tori; the volume map from source
+to target then has its boundary prescribed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..base.arrays import read_only
+from ..base.progress import Progress
+from ..certificate.checks import certify
+from ..certificate.findings import Certificate
+from ..errors import ArrayError, CertificationError, OptionError, SolverError
+from ..maps.history import IterationRecord
+from ..maps.result import MapResult
+from ..measures.elements import Distortion, distortion
+from ..mesh.meshes import TetMesh
+from ..mesh.refinement import Refinement, refine_boundary_joins
+from ..volume.flip_free import FlipFreeSolver
+from ..volume.options import FlipFreeOptions
+from ..volume.untangle import untangle_refining
+from ..volume.vsem import minimise_volumetric_stretch
+from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
+from .flat_torus import FlatSurface, Gauge, choose_gauge
+from .landmarks import Landmarks, read_landmarks
+from .match import affine_landmark_map, match_surfaces
+
+__all__ = ["Registration", "register"]
+
+_log = logging.getLogger("stretchmap")
+
+_WARM_STEPS, _WARM_C = 3, 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Registration(MapResult):
+    """A map from one solid torus onto another.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        The source, refined if refinement was needed, on the boundary, too; the first vertices are
+        those of the input.
+    target : TetMesh
+    image : ndarray, shape (n, 3)
+        Image of each vertex; boundary vertices lie on the target's surface, landmarks on their
+        counterparts.
+    landmarks : Landmarks
+    landmark_error : float
+        Largest distance of a landmark's image from its counterpart, as a share of the diagonal of
+        the target's bounding box.
+    gauge : Gauge
+        How the flat tori were laid on each other.
+    h : str
+        ``"smooth"`` or ``"affine"``.
+    refinement : Refinement or None
+        Of the source with its boundary edges split.
+    boundary_splits : int
+        Edges of the source's boundary that were split where it was too coarse: its image would
+        cross itself, or the affine map turn a face over.
+    history : tuple of IterationRecord
+        Stages ``"match"``, ``"vsem"``, ``"untangle"``, ``"frozen"``.
+    distortion : Distortion
+    certificate : Certificate
+    converged : bool
+    stop_reason : str
+    seconds : dict
+    torus : None
+    """
+
+    title = "registration"
+
+    solid: TetMesh
+    target: TetMesh
+    image: NDArray[np.float64]
+    landmarks: Landmarks
+    landmark_error: float
+    gauge: Gauge
+    h: str
+    refinement: Refinement | None = field(repr=False)
+    boundary_splits: int
+    history: tuple[IterationRecord, ...] = field(repr=False)
+    distortion: Distortion
+    certificate: Certificate
+    converged: bool
+    stop_reason: str
+    seconds: Mapping[str, float]
+    torus: None = None
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """Landmarks, gauge, kind of h and what was added to the input mesh."""
+        added = self.refinement
+        snapped = self.landmarks.snapped
+        return {
+            "h": self.h,
+            "landmarks": len(self.landmarks),
+            "landmark_error": self.landmark_error,
+            "snapped": float(snapped.max()) if snapped.size else 0.0,
+            "gauge": dataclasses.asdict(self.gauge),
+            "boundary_splits": self.boundary_splits,
+            "added_vertices": 0 if added is None else added.n_split,
+            "added_tets": 0 if added is None else added.n_added_tets,
+        }
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """The target (``target_V``, ``target_T``) and the landmarks (k, 2)."""
+        pairs = np.stack([self.landmarks.source, self.landmarks.target], axis=1)
+        return {"target_V": self.target.V, "target_T": self.target.T, "landmarks": pairs}
+
+
+def register(
+    source: TetMesh,
+    target: TetMesh,
+    landmarks: Landmarks | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
+    *,
+    h: str = "smooth",
+    max_iter: int = 300,
+    tol: float = 1e-3,
+    keep_best: bool = False,
+    solver: str = "auto",
+    options: FlipFreeOptions | None = None,
+    progress: Progress | None = None,
+) -> Registration:
+    """Map one solid torus onto another, every piece keeping its share of the volume.
+
+    Parameters
+    ----------
+    source, target : TetMesh
+        Solid tori.
+    landmarks : Landmarks, (source, target), path or None
+        Pairs that correspond: vertex ids (k,) or points (k, 3) on either side, or a CSV file (see
+        `read_landmarks`). Points are moved to the nearest boundary vertex; the result says how far.
+    h : {"smooth", "affine"}
+        How landmarks are reached after the surfaces were matched for least distortion of area and
+        shape. ``"smooth"``: by the same matching with the landmarks held, kept free of folds by a
+        barrier. ``"affine"``: by the paper's piecewise-affine map on a Delaunay triangulation of
+        the landmarks, here a periodic one.
+    max_iter : int
+        Most steps of the surface matching, twice if landmarks are held in it. With 0 and
+        ``h="affine"`` the boundary map is the paper's, but for the choice of the flat tori.
+    tol : float
+        Stop the surface matching when a step lowers its energy by no more than this share.
+    keep_best : bool
+        Return the map even if it is not certified.
+    solver : {"auto", "direct", "multigrid", "jacobi", "cholmod"}
+        Linear solver of the harmonic and fixed-point steps; the last in builds that have it.
+    options : FlipFreeOptions, optional
+        Knobs of the volume optimisation.
+    progress : Progress, optional
+        Called once per step.
+
+    Returns
+    -------
+    Registration
+
+    Raises
+    ------
+    MeshError
+        A mesh is not a solid torus, see `TetMesh.require_solid_torus`.
+    LandmarkError
+        Landmarks contradict each other; ``ids`` are the two at fault.
+    CertificationError
+        The map is not a bijection, ``ids`` are the elements.
+    OptionError
+        An option out of range.
+    SolverError
+        A numerical step broke down.
+
+    Notes
+    -----
+    The flat tori can be laid on each other in several ways that respect orientation and meridian:
+    both directions reversed or not, Dehn twists, and any shift. With three or more landmarks the
+    one that fits them best is taken; else the one in which the two surfaces differ least from
+    similar shapes (rotation, translation, scale). Reflections are never used.
+    """
+    if h not in ("smooth", "affine"):
+        raise OptionError(f"h must be 'smooth' or 'affine', got {h!r}")
+    if max_iter < 0 or not tol >= 0.0:
+        raise OptionError(f"max_iter and tol must not be negative, got {max_iter} and {tol}")
+    for mesh in (source, target):
+        mesh.require_solid_torus()
+    marks = _landmarks(landmarks, source, target)
+    seconds: dict[str, float] = {}
+    clock = time.perf_counter()
+    boundary, gauge, history = _boundary_map(source, target, marks, h, max_iter, tol, progress)
+    seconds["boundary"] = time.perf_counter() - clock
+    if len(boundary.crossings) and not keep_best:
+        raise CertificationError(
+            f"{len(boundary.crossings)} pairs of faces of the boundary image cross, and refining "
+            "the source's boundary does not help: the surfaces differ too much; landmarks may "
+            "bring them together, keep_best=True returns the map all the same",
+            boundary.crossings.ravel(),
+        )
+    return _fill(
+        boundary, source.n_vertices, target, marks, gauge, h, history,
+        options or FlipFreeOptions(), solver, keep_best, seconds, progress,
+    )  # fmt: skip
+
+
+def _landmarks(given: Any, source: TetMesh, target: TetMesh) -> Landmarks:
+    if given is None:
+        none = np.zeros(0, np.int32)
+        return Landmarks(none, none, np.zeros((0, 2)))
+    if isinstance(given, Landmarks):
+        return Landmarks.of(source, target, given.source, given.target) if len(given) else given
+    if isinstance(given, (str, os.PathLike)):
+        return read_landmarks(given, source, target)
+    if not (isinstance(given, (tuple, list)) and len(given) == 2):
+        raise ArrayError("landmarks must be a pair (source, target), a file or a Landmarks object")
+    return Landmarks.of(source, target, *given)
+
+
+def _boundary_map(
+    source: TetMesh,
+    target: TetMesh,
+    marks: Landmarks,
+    h: str,
+    max_iter: int,
+    tol: float,
+    progress: Progress | None,
+) -> tuple[EmbeddedBoundary, Gauge, tuple[IterationRecord, ...]]:
+    """Points of the target surface for the boundary vertices of the source, refined if need be."""
+    first, second = FlatSurface.of(source.surface), FlatSurface.of(target.surface)
+    pairs = np.stack(
+        [source.boundary_index[marks.source], target.boundary_index[marks.target]], axis=1
+    )
+    gauge = choose_gauge(first, second, pairs)
+    first = first.changed(gauge)
+    held = pairs if h == "smooth" else pairs[:0]
+    match = match_surfaces(
+        first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
+    )
+    y, points = match.y, match.points
+    if h == "affine":
+        starts, ends = y[pairs[:, 0]], second.turns[pairs[:, 1]]
+        source, y, folded = unfold_boundary(
+            source, y, lambda at: affine_landmark_map(starts, ends, at)
+        )
+        if len(folded):
+            raise SolverError(
+                f"the source mesh is too coarse for the affine map: {len(folded)} faces turn over, "
+                "and refining them does not help; use h='smooth'",
+                folded,
+            )
+        points = second.points(y)
+    points[pairs[:, 0]] = second.surface.V[pairs[:, 1]]
+    return embed_boundary(source, second, y, points, pairs[:, 0]), gauge, match.history
+
+
+def _fill(
+    boundary: EmbeddedBoundary,
+    n_given: int,
+    target: TetMesh,
+    marks: Landmarks,
+    gauge: Gauge,
+    h: str,
+    history: tuple[IterationRecord, ...],
+    options: FlipFreeOptions,
+    solver: str,
+    keep_best: bool,
+    seconds: dict[str, float],
+    progress: Progress | None,
+) -> Registration:
+    """The volume map with the boundary prescribed."""
+    clock = time.perf_counter()
+    source, points = boundary.solid, boundary.points
+    n_split = source.n_vertices - n_given
+    refinement = refine_boundary_joins(source)
+    solid, ids = refinement.solid, source.boundary_vertices
+    enclosed = float(_core.enclosed_volume(points, source.surface.F))
+    if not enclosed > 0.0:
+        raise SolverError("the boundary image is inside out")
+    length, centre = enclosed ** (1.0 / 3.0), points.mean(axis=0)
+    V = np.ascontiguousarray((solid.V - solid.V.mean(axis=0)) / source.volume ** (1.0 / 3.0))
+    x = np.zeros((solid.n_vertices, 3))
+    x[ids] = (points - centre) / length
+    fixed = np.zeros(solid.n_vertices, np.uint8)
+    fixed[ids] = 1
+    run = minimise_volumetric_stretch(
+        V, solid.T, fixed, x, c=_WARM_C, max_iter=_WARM_STEPS, tol=0.0, solver=solver,
+        progress=progress,
+    )  # fmt: skip
+    flip_free = FlipFreeSolver(
+        V=V, T=solid.T, boundary=ids, faces=ids[source.surface.F], R=2.0, r=1.0, options=options,
+        progress=progress,
+    )  # fmt: skip
+    flip_free, refinement, x, flips = untangle_refining(
+        flip_free, refinement, run.image, glide=False
+    )
+    solid = refinement.solid
+    converged, stop_reason = False, f"{flips} tets could not be untangled"
+    if flips == 0:
+        x, converged, stop_reason = flip_free.minimise(
+            x, glide=False, start=1.0, goal=options.volume_weight
+        )
+    seconds["volume"] = time.perf_counter() - clock
+    image = x * length + centre
+    image[ids] = points
+    clock = time.perf_counter()
+    certificate = certify(solid, image)
+    seconds["certificate"] = time.perf_counter() - clock
+    if not certificate.certified and not keep_best:
+        raise CertificationError(
+            f"the registration is not certified: {certificate.reason}; keep_best=True returns it "
+            "all the same",
+            next(iter(certificate.ids.values()), ()),
+        )
+    if not converged:
+        _log.warning("registration not converged: %s", stop_reason)
+    gap = image[marks.source] - target.V[marks.target]
+    size = float(np.linalg.norm(np.ptp(target.V, axis=0)))
+    return Registration(
+        solid=solid,
+        target=target,
+        image=read_only(image),
+        landmarks=marks,
+        landmark_error=float(np.linalg.norm(gap, axis=1).max(initial=0.0)) / size,
+        gauge=gauge,
+        h=h,
+        refinement=refinement if refinement.n_split else None,
+        boundary_splits=n_split,
+        history=history + run.history + tuple(flip_free.history),
+        distortion=distortion(solid, image),
+        certificate=certificate,
+        converged=converged,
+        stop_reason=stop_reason,
+        seconds=seconds,
+    )

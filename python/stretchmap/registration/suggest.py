@@ -1,0 +1,84 @@
+"""Landmarks found by a rule, from a registration there is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .. import _core
+from ..errors import LandmarkError, OptionError
+
+if TYPE_CHECKING:
+    from .map import Registration
+from .landmarks import Landmarks, similarity
+
+__all__ = ["landmarks_between"]
+
+_SAME_WAY = 0.8  # least cosine between the normals of two points that are taken to correspond
+
+
+def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
+    """Landmarks by a geometric rule, where nobody has placed any.
+
+    The source is laid on the target by the similarity that fits the registration best. Candidates
+    are taken one by one from the source's boundary, each the farthest from those before; each goes
+    with the nearest target vertex, provided that the normals there agree (cosine above 0.8) and
+    that the way back ends within two mean edge lengths of where it began.
+
+    Parameters
+    ----------
+    registration : Registration
+        Made without landmarks.
+    n : int
+        Number of landmarks.
+
+    Raises
+    ------
+    OptionError
+        If ``n`` is not positive.
+    LandmarkError
+        If the rule finds fewer.
+    """
+    if n < 1:
+        raise OptionError(f"n must be positive, got {n}")
+    solid, target = registration.solid, registration.target
+    first, second = solid.surface, target.surface
+    image = registration.image[solid.boundary_vertices]
+    rotation, scale, shift = similarity(first.V, image)
+    moved = scale * first.V @ rotation + shift
+    there, back = cKDTree(second.V), cKDTree(moved)
+    _, partner = there.query(moved)
+    normals = _vertex_normals(first.V, first.F) @ rotation
+    agree = np.einsum("ij,ij->i", normals, _vertex_normals(second.V, second.F)[partner])
+    _, home = back.query(second.V[partner])
+    edge = np.linalg.norm(np.diff(moved[first.edges], axis=1), axis=2).mean()
+    usable = (agree > _SAME_WAY) & (np.linalg.norm(moved[home] - moved, axis=1) < 2.0 * edge)
+    chosen: list[int] = []
+    nearest = np.where(usable, np.linalg.norm(moved - moved.mean(axis=0), axis=1), -1.0)
+    while len(chosen) < n and nearest.max() > 0.0:
+        i = int(np.argmax(nearest))
+        if partner[i] in partner[chosen]:
+            nearest[i] = -1.0
+            continue
+        chosen.append(i)
+        distance = np.linalg.norm(moved - moved[i], axis=1)
+        nearest = np.minimum(nearest, distance) if len(chosen) > 1 else distance
+        nearest[~usable] = -1.0
+    if len(chosen) < n:
+        raise LandmarkError(f"the rule finds {len(chosen)} landmarks, {n} were asked for")
+    return Landmarks.of(
+        solid,
+        target,
+        solid.boundary_vertices[chosen],
+        target.boundary_vertices[partner[chosen]],
+    )
+
+
+def _vertex_normals(V: NDArray[np.float64], F: NDArray[np.int32]) -> NDArray[np.float64]:
+    face = _core.face_area_vectors(V, F)
+    sums = [np.bincount(F.ravel(), np.repeat(c, 3), minlength=len(V)) for c in face.T]
+    normals = np.stack(sums, axis=1)
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)

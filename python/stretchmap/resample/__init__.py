@@ -1,0 +1,1 @@
+"""Structured hexahedra, and fields carried between solids."""

@@ -1,0 +1,47 @@
+"""Closed surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.torus import TWO_PI, Torus
+from ..errors import OptionError
+from ..mesh.meshes import TriMesh
+from .solids import ball, solid_double_torus
+
+__all__ = ["double_torus", "sphere", "torus_surface"]
+
+
+def torus_surface(nu: int = 60, nv: int = 20, R: float = 3.0, r: float = 1.0) -> TriMesh:
+    """A regular triangulation of the standard torus, faces outward.
+
+    Parameters
+    ----------
+    nu, nv : int
+        Vertices the long and the short way round, at least 3; vertex ``i nv + j`` lies at the
+        angles ``(2 pi i / nu, 2 pi j / nv)``.
+    R, r : float
+        Radii, ``0 < r < R``.
+
+    Raises
+    ------
+    OptionError
+        If there are fewer than three vertices either way or the radii do not make a torus.
+    """
+    if nu < 3 or nv < 3:
+        raise OptionError(f"a torus needs at least 3 vertices either way, got {nu} and {nv}")
+    i, j = (index.ravel() for index in np.indices((nu, nv)))
+    a, b = i * nv + j, (i + 1) % nu * nv + j
+    c, d = (i + 1) % nu * nv + (j + 1) % nv, i * nv + (j + 1) % nv
+    faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
+    return TriMesh(Torus(R, r).xi(TWO_PI * i / nu, TWO_PI * j / nv), faces)
+
+
+def sphere(n: int = 6) -> TriMesh:
+    """The unit sphere, ``48 n^2`` faces; the boundary of :func:`ball`."""
+    return ball(n).surface
+
+
+def double_torus(n: int = 2) -> TriMesh:
+    """A closed surface of genus 2, the boundary of :func:`solid_double_torus`."""
+    return solid_double_torus(n).surface

@@ -1,0 +1,491 @@
+"""Area map: derivatives, identities, exact cases, invariance, thresholds on real surfaces."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import stretchmap
+from stretchmap import TriMesh, _core, area_map
+from stretchmap.conformal.map import conformal_map
+from stretchmap.errors import GenusError, OptionError, SolverError
+from stretchmap.maps.files import load_map
+
+TWO_PI = 2.0 * np.pi
+
+
+def torus_grid(nu: int, nv: int, ratio: float, seed: int | None = None) -> TriMesh:
+    """Torus of revolution sampled evenly in the equal-area coordinates (u, s)."""
+    i, j = np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij")
+    u, s = TWO_PI * i.ravel() / nu, TWO_PI * j.ravel() / nv
+    v = _core.angle_from_equal_area(s, 1.0 / ratio)
+    points = stretchmap.Torus(ratio, 1.0).xi(u, v)
+    a, b = i.ravel() * nv + j.ravel(), ((i.ravel() + 1) % nu) * nv + j.ravel()
+    c = ((i.ravel() + 1) % nu) * nv + (j.ravel() + 1) % nv
+    d = i.ravel() * nv + (j.ravel() + 1) % nv
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    if seed is not None:
+        order = np.random.default_rng(seed).permutation(len(points))
+        inverse = np.argsort(order)
+        points, faces = points[order], inverse[faces]
+    return TriMesh(points, faces)
+
+
+@pytest.fixture(scope="module")
+def bumpy() -> TriMesh:
+    """A small bumpy torus with uneven triangles."""
+    mesh = torus_grid(24, 16, 2.2)
+    rng = np.random.default_rng(5)
+    x, y, z = mesh.V.T
+    bump = 1.0 + 0.25 * np.sin(3.0 * np.arctan2(y, x)) * np.cos(2.0 * z) + 0.02 * rng.random(len(x))
+    return TriMesh(mesh.V * bump[:, None], mesh.F)
+
+
+@pytest.fixture(scope="module")
+def chart(bumpy: TriMesh) -> _core.SurfaceChart:
+    return _core.SurfaceChart(bumpy.topology, conformal_map(bumpy).forms)
+
+
+@pytest.fixture(scope="module")
+def turns(bumpy: TriMesh) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    conformal = conformal_map(bumpy)
+    return conformal.turns + 1e-3 * rng.normal(size=conformal.turns.shape)
+
+
+# --- stretch energy and Laplacian ---------------------------------------------------------------
+
+
+def cotangent_stretch_laplacian(mesh: TriMesh, image: np.ndarray) -> np.ndarray:
+    """(4.2)-(4.3) literally: cotangents of the image over the stretch factors."""
+    L = np.zeros((len(image), len(image)))
+    for face, area in zip(mesh.F, mesh.face_areas, strict=True):
+        p = image[face]
+        size = 0.5 * np.linalg.norm(np.cross(p[1] - p[0], p[2] - p[0]))
+        for k in range(3):
+            i, j = face[(k + 1) % 3], face[(k + 2) % 3]
+            a, b = p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]
+            cotangent = a @ b / np.linalg.norm(np.cross(a, b))
+            w = 0.5 * cotangent * size / area
+            L[[i, j], [j, i]] -= w
+            L[[i, j], [i, j]] += w
+    return L
+
+
+def test_stretch_laplacian_is_the_printed_one(bumpy: TriMesh) -> None:
+    image = bumpy.V @ np.diag([1.0, 0.7, 1.3])
+    ours = _core.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image).toarray()
+    np.testing.assert_allclose(ours, cotangent_stretch_laplacian(bumpy, image), atol=1e-12)
+
+
+def test_stretch_energy_identities(bumpy: TriMesh) -> None:
+    image = bumpy.V @ np.diag([1.0, 0.7, 1.3])
+    L = _core.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image)
+    energy = _core.surface_stretch_energy(bumpy.F, bumpy.face_areas, image)
+    areas = TriMesh(image, bumpy.F).face_areas
+    assert energy == pytest.approx(0.5 * np.trace(image.T @ (L @ image)), rel=1e-13)
+    assert energy == pytest.approx((areas**2 / bumpy.face_areas).sum(), rel=1e-13)
+    assert energy > areas.sum() ** 2 / bumpy.area
+    similar = _core.surface_stretch_energy(bumpy.F, bumpy.face_areas, 3.0 * bumpy.V)
+    assert similar == pytest.approx(81.0 * bumpy.area, rel=1e-13)
+
+
+def test_stretch_gradient_by_differences(bumpy: TriMesh) -> None:
+    rng = np.random.default_rng(0)
+    direction = rng.normal(size=bumpy.V.shape)
+    image, h = bumpy.V @ np.diag([1.0, 0.7, 1.3]), 1e-5
+
+    def energy(t: float) -> float:
+        return _core.surface_stretch_energy(bumpy.F, bumpy.face_areas, image + t * direction)
+
+    gradient = 2.0 * _core.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image) @ image
+    numeric = (energy(h) - energy(-h)) / (2.0 * h)
+    assert (gradient * direction).sum() == pytest.approx(numeric, rel=1e-7)
+
+
+def test_chart_energy_and_gradient(
+    bumpy: TriMesh, chart: _core.SurfaceChart, turns: np.ndarray
+) -> None:
+    periods = np.array([1.6, 0.9])
+    areas = bumpy.face_areas
+    rng = np.random.default_rng(0)
+    direction, h = rng.normal(size=turns.shape), 1e-6
+
+    def energy(t: float) -> float:
+        return _core.chart_stretch_energy(chart, areas, periods, turns + t * direction)
+
+    half = _core.chart_stretch_product(chart, areas, periods, turns, turns) * periods
+    numeric = (energy(h) - energy(-h)) / (2.0 * h)
+    assert 2.0 * (half * direction * periods).sum() == pytest.approx(numeric, rel=1e-6)
+    signed = _core.turn_areas(chart, turns) * periods.prod()
+    assert energy(0.0) == pytest.approx((signed**2 / areas).sum(), rel=1e-12)
+    assert signed.sum() == pytest.approx(periods.prod(), rel=1e-12)
+    laplacian = _core.chart_stretch_laplacian(chart, areas, periods, turns)
+    np.testing.assert_allclose(laplacian @ np.ones(len(turns)), 0.0, atol=1e-12)
+    moved = _core.chart_stretch_product(chart, areas, periods, turns, turns + direction)
+    before = _core.chart_stretch_product(chart, areas, periods, turns, turns)
+    np.testing.assert_allclose(moved - before, laplacian @ direction, atol=1e-10)
+
+
+# --- chart --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tube_ratio", [0.0, 0.3, 0.95, 0.9999])
+def test_equal_area_coordinate_and_its_inverse(tube_ratio: float) -> None:
+    s = np.concatenate([np.linspace(-20.0, 20.0, 2001), np.pi * np.arange(-5, 6)])
+    v = _core.angle_from_equal_area(s, tube_ratio)
+    np.testing.assert_allclose(v + tube_ratio * np.sin(v), s, atol=1e-13)
+    np.testing.assert_allclose(_core.equal_area_from_angle(v, tube_ratio), s, atol=1e-13)
+    assert np.abs(v - s).max() <= tube_ratio + 1e-12
+
+
+def test_open_forms_are_refused(bumpy: TriMesh) -> None:
+    forms = conformal_map(bumpy).forms.copy()
+    forms[0, 0] += 1
+    with pytest.raises(SolverError, match="not closed") as caught:
+        _core.SurfaceChart(bumpy.topology, forms)
+    assert len(caught.value.ids) == 2
+
+
+# --- finishing energy ---------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def glide(bumpy: TriMesh, chart: _core.SurfaceChart) -> tuple[_core.GlideProblem, np.ndarray]:
+    rng = np.random.default_rng(2)
+    result = area_map(bumpy, finish="none", sem_iter=2)
+    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
+    angles = result.angles + 5e-3 * rng.normal(size=result.angles.shape)
+    return _core.GlideProblem(chart, reference, result.ratio), angles
+
+
+@pytest.mark.parametrize("weights", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_finishing_derivatives_by_differences(
+    glide: tuple[_core.GlideProblem, np.ndarray], weights: tuple[float, float, float]
+) -> None:
+    problem, angles = glide
+    direction = np.random.default_rng(3).normal(size=angles.shape)
+    h = 1e-5
+
+    def at(t: float) -> tuple[float, np.ndarray, object]:
+        return _core.glide_energy(problem, *weights, 1.1, angles + t * direction)
+
+    _, gradient, hessian = at(0.0)
+    (plus, gradient_plus, _), (minus, gradient_minus, _) = at(h), at(-h)
+    assert gradient @ direction.ravel() == pytest.approx((plus - minus) / (2 * h), rel=1e-5)
+    numeric = (gradient_plus - gradient_minus) / (2 * h)
+    np.testing.assert_allclose(
+        hessian @ direction.ravel(), numeric, atol=1e-7 * np.abs(numeric).max()
+    )
+
+
+def test_facing_gradient_by_differences(bumpy: TriMesh, chart: _core.SurfaceChart) -> None:
+    result = area_map(bumpy, finish="none", sem_iter=2)
+    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
+    problem = _core.GlideProblem(chart, reference, result.ratio, facing=True)
+    plain = _core.GlideProblem(chart, reference, result.ratio)
+    angles = np.array(result.angles)
+    direction = np.random.default_rng(5).normal(size=angles.shape)
+    h = 1e-6
+
+    def at(t: float) -> tuple[float, np.ndarray, object]:
+        return _core.glide_energy(problem, 0.0, 0.0, 1.0, 1.0, angles + t * direction)
+
+    slope = (at(h)[0] - at(-h)[0]) / (2 * h)
+    assert at(0.0)[1] @ direction.ravel() == pytest.approx(slope, rel=1e-6)
+    assert at(0.0)[0] > _core.glide_energy(plain, 0.0, 0.0, 1.0, 1.0, angles)[0]
+
+
+def test_model_is_convex_and_bounded_by_nothing_but_convexity(
+    glide: tuple[_core.GlideProblem, np.ndarray],
+) -> None:
+    problem, angles = glide
+    value, gradient, _ = _core.glide_energy(problem, 1.0, 0.1, 1.0, 1.0, angles)
+    same, same_gradient, model = _core.glide_energy(problem, 1.0, 0.1, 1.0, 1.0, angles, True)
+    assert same == value
+    np.testing.assert_array_equal(same_gradient, gradient)
+    assert np.linalg.eigvalsh(model.toarray()).min() > -1e-10 * abs(model).max()
+
+
+def test_finishing_energy_against_a_second_computation(
+    bumpy: TriMesh, glide: tuple[_core.GlideProblem, np.ndarray]
+) -> None:
+    problem, angles = glide
+    scale = _core.best_scale(problem, angles)
+    ratio = area_map(bumpy, finish="none", sem_iter=0).ratio
+    torus = stretchmap.Torus.from_ratio(ratio, area=1.0)
+    image = torus.xi(angles[:, 0], angles[:, 1])
+    shares = bumpy.face_areas / bumpy.area
+    areas = TriMesh(image, bumpy.F).face_areas
+    np.testing.assert_allclose(_core.glide_areas(problem, angles), areas, rtol=1e-12)
+    rho = areas / shares / scale
+    value = _core.glide_energy(problem, 1.0, 0.0, 0.0, scale, angles)[0]
+    assert value == pytest.approx((shares * (rho + 1.0 / rho - 2.0)).sum(), rel=1e-10)
+    for other in (0.99 * scale, 1.01 * scale):
+        assert _core.glide_energy(problem, 1.0, 0.0, 0.0, other, angles)[0] > value
+    jacobians = []
+    for face in bumpy.F:
+        p, q = bumpy.V[face], image[face]
+        jacobians.append(_singular_values(p, q))
+    s1, s2 = np.array(jacobians).T
+    value = _core.glide_energy(problem, 0.0, 1.0, 0.0, scale, angles)[0]
+    assert value == pytest.approx((shares * (0.5 * (s1 / s2 + s2 / s1) - 1.0)).sum(), rel=1e-9)
+
+
+def _singular_values(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Of the affine map between two triangles in space."""
+
+    def flat(t: np.ndarray) -> np.ndarray:
+        return np.linalg.qr(np.column_stack([t[1] - t[0], t[2] - t[0]]))[1]
+
+    return np.linalg.svd(flat(q) @ np.linalg.inv(flat(p)), compute_uv=False)
+
+
+def _block_system(block: int, quasi: bool) -> sparse.csr_matrix:
+    """Full blocks on the pattern of a torus; the last unknown of each block a multiplier or not."""
+    faces = torus_grid(9, 7, 2.0, seed=8).F
+    rng = np.random.default_rng(6)
+    n = block * (faces.max() + 1)
+    signs = np.ones(block)
+    if quasi:
+        signs[-1] = -1.0
+    rows, columns, values = [], [], []
+    for face in faces:
+        unknowns = (block * face[:, None] + np.arange(block)).ravel()
+        half = rng.normal(size=(len(unknowns), len(unknowns)))
+        s = np.tile(signs, 3)
+        part = half @ half.T
+        part[np.multiply.outer(s, s) < 0.0] *= 3.0
+        part[np.ix_(s < 0.0, s < 0.0)] *= -1e-4
+        rows.append(np.repeat(unknowns, len(unknowns)))
+        columns.append(np.tile(unknowns, len(unknowns)))
+        values.append(part.ravel())
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sparse.csr_matrix(entries, shape=(n, n))
+
+
+@pytest.mark.parametrize(("block", "quasi"), [(2, False), (3, False), (2, True), (3, True)])
+def test_block_factor_against_scipy(block: int, quasi: bool) -> None:
+    matrix = _block_system(block, quasi)
+    right = np.random.default_rng(9).normal(size=matrix.shape[0])
+    solve = _core.block_ldlt_solve_2 if block == 2 else _core.block_ldlt_solve_3
+    expected = sparse.linalg.spsolve(matrix.tocsc(), right)
+    np.testing.assert_allclose(solve(matrix, right), expected, atol=1e-8 * abs(expected).max())
+
+
+def test_singular_pivot_is_an_error() -> None:
+    matrix = _block_system(2, False)
+    matrix.data[:] = 0.0
+    with pytest.raises(SolverError, match="pivot"):
+        _core.block_ldlt_solve_2(matrix, np.ones(matrix.shape[0]))
+
+
+def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
+    conformal = conformal_map(bumpy)
+    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
+    candidates = np.array([[0.0, 1.5], [0.3, 2.2], [-0.45, 5.0]])
+    rated = _core.phase_qualities(reference, bumpy.F, conformal.turns, candidates)
+    for (phase, ratio), quality in zip(candidates, rated, strict=True):
+        image = _core.torus_image(conformal.turns, phase, ratio)
+        exact = _core.surface_quality(reference, bumpy.F, image)
+        assert quality.energy == pytest.approx(exact.energy, rel=1e-4)
+        assert quality.angle_mean == pytest.approx(exact.angle_mean, rel=1e-4)
+    similar = _core.surface_quality(reference, bumpy.F, 2.0 * bumpy.V)
+    assert similar.energy == pytest.approx(1.0, abs=1e-12)
+    assert similar.angle_max == pytest.approx(1.0, abs=1e-7)
+    assert similar.face_sd < 1e-12
+
+
+def test_newton_refuses_a_start_with_flips(
+    glide: tuple[_core.GlideProblem, np.ndarray],
+) -> None:
+    problem, angles = glide
+    with pytest.raises(SolverError, match="flipped") as caught:
+        _core.SurfaceNewton(problem, angles[:, ::-1].copy())
+    assert len(caught.value.ids) > 0
+
+
+# --- the map ------------------------------------------------------------------------------------
+
+
+def test_equal_area_torus_is_a_fixed_point() -> None:
+    ratio = 2.5
+    mesh = torus_grid(60, 36, ratio, seed=3)
+    chart = _core.SurfaceChart(mesh.topology, conformal_map(mesh).forms)
+    u, v, _ = stretchmap.Torus(ratio, 1.0).coordinates(mesh.V)
+    s = _core.equal_area_from_angle(v, 1.0 / ratio)
+    turns = _lift(mesh, chart, np.column_stack([u, s]) / TWO_PI)
+    sem = _core.SurfaceSem(chart, np.full(len(mesh.F), 1.0), ratio, turns)
+    start = sem.figures()
+    assert start.energy == pytest.approx(1.0, abs=1e-12)
+    assert start.ring_sd < 1e-12
+    sem.step()
+    np.testing.assert_allclose(sem.turns - sem.turns[0], turns - turns[0], atol=1e-9)
+
+
+def _lift(mesh: TriMesh, chart: _core.SurfaceChart, turns: np.ndarray) -> np.ndarray:
+    """Whole turns added so that the corners of every face fit together under the chart's shifts."""
+    shift = np.stack([chart.shift_u, chart.shift_v], axis=2)
+    lifted, seen, stack = turns.copy(), np.zeros(len(turns), bool), [0]
+    seen[0] = True
+    neighbours: dict[int, list[tuple[int, np.ndarray]]] = {}
+    for face, offsets in zip(mesh.F, shift, strict=True):
+        for k in range(3):
+            a, b = k, (k + 1) % 3
+            neighbours.setdefault(face[a], []).append((face[b], offsets[b] - offsets[a]))
+    while stack:
+        i = stack.pop()
+        for j, jump in neighbours[i]:
+            if not seen[j]:
+                lifted[j] += np.round(lifted[i] - (lifted[j] + jump))
+                seen[j] = True
+                stack.append(j)
+    return lifted
+
+
+def test_history_records_and_falls(bumpy: TriMesh) -> None:
+    result = area_map(bumpy)
+    for stage in ("sem", "newton"):
+        records = [record for record in result.history if record.stage == stage]
+        energies = np.array([record.energy for record in records])
+        energies = energies[np.isfinite(energies)]
+        assert len(energies) > 2
+        assert (np.diff(energies) <= 1e-12 * energies[:-1]).all()
+        assert all(record.flips == 0 for record in records)
+    assert result.distortion.flips == 0
+    assert result.history[-1].ring_sd == pytest.approx(result.distortion.ring_sd, abs=1e-9)
+    assert result.history[-1].element_sd == pytest.approx(result.distortion.element_sd, rel=1e-6)
+
+
+def test_image_is_on_the_torus_of_the_same_area(bumpy: TriMesh) -> None:
+    result = area_map(bumpy)
+    assert result.torus.area == pytest.approx(bumpy.area, rel=1e-12)
+    _, _, distance = result.torus.coordinates(result.image)
+    np.testing.assert_allclose(distance, result.torus.r, rtol=1e-12)
+    larger = result.image_on(result.torus.scaled(2.0))
+    np.testing.assert_allclose(larger, 2.0 * result.image, atol=1e-12)
+    with pytest.raises(OptionError):
+        result.image_on(stretchmap.Torus(result.torus.R * 1.1, result.torus.r))
+
+
+def test_phase_and_ratio_can_be_fixed(bumpy: TriMesh) -> None:
+    searched = area_map(bumpy, finish="none")
+    given = area_map(bumpy, finish="none", phase=searched.phase, ratio=searched.ratio)
+    np.testing.assert_allclose(given.angles, searched.angles, atol=1e-12)
+    shifted = area_map(bumpy, finish="none", phase=searched.phase + 0.5)
+    assert shifted.phase == searched.phase + 0.5
+    assert shifted.distortion.angle_mean > searched.distortion.angle_mean
+    free = area_map(bumpy, finish="none", ratio="search")
+    assert free.ratio != searched.ratio
+    torus = stretchmap.Torus(5.0, 2.0)
+    onto = area_map(bumpy, finish="none", torus=torus)
+    assert onto.torus == torus and onto.ratio == torus.ratio
+
+
+def test_invariant_under_rotation_and_scale(bumpy: TriMesh) -> None:
+    rotation = np.linalg.qr(np.random.default_rng(11).normal(size=(3, 3)))[0]
+    rotation *= np.sign(np.linalg.det(rotation))
+    a, b = area_map(bumpy), area_map(TriMesh(7.0 * bumpy.V @ rotation.T, bumpy.F))
+    np.testing.assert_allclose(b.angles, a.angles, atol=1e-5)
+    assert b.torus.area == pytest.approx(49.0 * a.torus.area, rel=1e-12)
+
+
+def test_invariant_under_renumbering(bumpy: TriMesh) -> None:
+    rng = np.random.default_rng(11)
+    order = rng.permutation(len(bumpy.V))
+    faces = np.argsort(order)[bumpy.F[rng.permutation(len(bumpy.F))]]
+    other = TriMesh(bumpy.V[order], faces)
+    a = area_map(bumpy, phase=0.1)
+    # The origin of v and the common sign of u and v belong to the numbering: bring them along.
+    start = area_map(bumpy, finish="none", phase=0.1).angles[order, 1]
+    first = area_map(other, finish="none", phase=0.0).angles[:, 1]
+    s_a, s_b = (_core.equal_area_from_angle(v, 1.0 / a.ratio) for v in (start, first))
+    shift = min(
+        (np.angle(np.exp(1j * (sign * s_a - s_b))) for sign in (1.0, -1.0)),
+        key=lambda x: np.abs(np.exp(1j * x) - np.exp(1j * x[0])).max(),
+    )
+    np.testing.assert_allclose(np.exp(1j * shift), np.exp(1j * shift[0]), atol=1e-8)
+    b = area_map(other, phase=float(shift[0] / TWO_PI))
+    np.testing.assert_allclose(b.distortion.ratios.std(), a.distortion.ratios.std(), rtol=1e-3)
+    assert b.distortion.angle_mean == pytest.approx(a.distortion.angle_mean, rel=1e-6)
+
+
+def test_same_input_same_bits(bumpy: TriMesh) -> None:
+    np.testing.assert_array_equal(area_map(bumpy).angles, area_map(bumpy).angles)
+
+
+@pytest.mark.parametrize(
+    ("name", "ring", "face", "angle"),
+    [
+        ("bob", 1e-6, 5e-3, 2.2),
+        ("rocker_arm_small", 2e-2, 2e-2, 3.0),
+        ("knot_8000", 1e-6, 5e-3, 2.0),
+    ],
+)
+def test_real_surfaces(load_surface, name: str, ring: float, face: float, angle: float) -> None:
+    result = area_map(load_surface(name))
+    d = result.distortion
+    assert d.flips == 0
+    assert d.ring_sd <= ring
+    assert d.element_sd <= face
+    assert d.total_distortion <= 1e-3
+    assert d.angle_mean <= angle
+
+
+def test_non_convergence_is_said_once(load_surface, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING, logger="stretchmap"):
+        result = area_map(load_surface("bob_small"), max_iter=1, finish="face")
+    assert not result.converged
+    assert "most steps done" in result.stop_reason
+    assert len(caplog.records) == 1
+
+
+def test_start_with_flips_is_replaced(bumpy: TriMesh) -> None:
+    conformal = conformal_map(bumpy)
+    rng = np.random.default_rng(4)
+    broken = conformal.turns + 0.1 * rng.normal(size=conformal.turns.shape)
+    chart = _core.SurfaceChart(bumpy.topology, conformal.forms)
+    assert (_core.turn_areas(chart, broken) <= 0.0).any()
+    result = area_map(bumpy, conformal=dataclasses.replace(conformal, turns=broken))
+    assert result.history[0].flips == 0
+    assert result.distortion.flips == 0
+
+
+def test_saved_map_comes_back(bumpy: TriMesh, tmp_path) -> None:
+    result = area_map(bumpy, finish="none")
+    result.save(tmp_path / "map.npz")
+    back = load_map(tmp_path / "map.npz")
+    np.testing.assert_array_equal(back.image, result.image)
+    np.testing.assert_array_equal(back.arrays["angles"], result.angles)
+    assert back.meta["phase"] == result.phase
+    assert "ring sd" in result.summary()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"ratio": "best"},
+        {"ratio": 1.0},
+        {"phase": np.nan},
+        {"finish": "all"},
+        {"max_iter": -1},
+        {"tol": 0.0},
+        {"shape_budget": 0.5},
+        {"sem_iter": -1},
+        {"torus": stretchmap.Torus(2.0, 1.0), "ratio": 2.0},
+    ],
+)
+def test_options_out_of_range(bumpy: TriMesh, options: dict) -> None:
+    with pytest.raises(OptionError):
+        area_map(bumpy, **options)
+
+
+def test_sphere_is_refused() -> None:
+    octahedron = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    with pytest.raises(GenusError):
+        area_map(TriMesh(octahedron, faces))

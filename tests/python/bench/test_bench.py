@@ -1,0 +1,79 @@
+"""The script that flags regressions of the benchmark executable."""
+
+from __future__ import annotations
+
+import copy
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+_BENCH = Path(__file__).resolve().parents[3] / "bench"
+
+
+@pytest.fixture(scope="module")
+def regression() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("regression", _BENCH / "regression.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def rows(factor: float = 1.0, slow: float = 1.0, flips: int = 0) -> list[dict[str, Any]]:
+    """A made-up run: copies at 1 GB/s, everything ``factor`` slower, one stage ``slow`` besides."""
+    return [
+        {"name": "bandwidth/copy/threads:1", "real_time": 1.0, "bytes_per_second": 1e9 / factor},
+        {"name": "sample/9/threads:1", "real_time": 7.0},
+        {"name": "volume.assemble/9/threads:1", "real_time": 2.0 * factor, "bytes": 1e6},
+        {"name": "volume.vsem/9/threads:1", "real_time": 8.0 * factor * slow, "flips": flips},
+    ]
+
+
+def test_a_ratio_is_what_it_says(regression: ModuleType) -> None:
+    summary = regression.summarise([rows(), rows(slow=3.0)])
+    # Geometric mean of 2 and 8 ms; copying 1e6 bytes takes 1 ms.
+    assert summary["overall"] == pytest.approx(4.0)
+    assert summary["stages"]["volume.vsem/9/threads:1"] == pytest.approx(2.0)
+    assert not any("sample" in name for name in summary["stages"])
+
+
+def test_a_slower_machine_is_no_regression(regression: ModuleType) -> None:
+    base = regression.summarise([rows()])
+    assert regression.regressions(regression.summarise([rows(factor=5.0)]), base, 1.01) == []
+
+
+def test_a_slower_stage_and_a_wrong_result_are(regression: ModuleType) -> None:
+    base = regression.summarise([rows()])
+    found = regression.regressions(regression.summarise([rows(slow=4.0)]), base, 1.6)
+    assert [line.split(":")[0] for line in found] == ["volume.vsem/9/threads"]
+    found = regression.regressions(regression.summarise([rows(flips=1)]), base, 1.6)
+    assert found == ["volume.vsem/9/threads:1 flips: 1 instead of 0"]
+
+
+def test_everything_slower_is(regression: ModuleType) -> None:
+    base = regression.summarise([rows()])
+    slower = copy.deepcopy(rows())
+    for row in slower[1:]:
+        row["real_time"] *= 3.0
+    found = regression.regressions(regression.summarise([slower]), base, 1.6)
+    assert found == ["all stages: 3.00 times the baseline"]
+
+
+def test_the_executable_itself(
+    regression: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if regression.find_executable() is None:
+        pytest.skip("stretchmap_bench is not built")
+    stored = tmp_path / "baseline.json"
+    common = ["--baseline", str(stored), "--size", "3000", "--repeat", "1"]
+    assert regression.main([*common, "--update"]) == 0
+    # Tiny stages on a busy machine: only the exact figures are asked for here.
+    assert regression.main([*common, "--margin", "1e6"]) == 0
+    assert "no regression" in capsys.readouterr().out
+    base = stored.read_text()
+    stored.write_text(base.replace('genus": 1', 'genus": 2'))
+    assert regression.main([*common, "--margin", "1e6"]) == 1
+    assert "genus: 1 instead of 2" in capsys.readouterr().out

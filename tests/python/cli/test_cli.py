@@ -1,0 +1,445 @@
+"""The command line: exit codes, one sentence of error, files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shapes
+import stretchmap as sm
+from stretchmap import TetMesh, TriMesh, samples
+from stretchmap.cli import GROUPS, main
+from stretchmap.cli.guard import guarded, in_words_of_the_command_line
+from stretchmap.errors import CertificationError
+
+pytest.importorskip("typer")
+
+# Processes of their own find the package wherever this one did.
+ENV = {**os.environ, "PYTHONPATH": str(Path(sm.__file__).parents[1])}
+
+REPORT_KEYS = {
+    "n_vertices", "n_elements", "flips", "ring_mean", "ring_sd", "element_mad", "element_sd",
+    "ratio_min", "ratio_max", "total_distortion", "energy", "iterations", "converged",
+    "stop_reason", "seconds", "torus", "versions", "certified", "reason",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def solid():
+    return samples.bumpy_torus(2500)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, solid):
+    """A folder with a good solid and its surface, made the current one."""
+    monkeypatch.chdir(tmp_path)
+    sm.write("solid.npz", solid)
+    sm.write("surface.ply", solid.surface)
+    return tmp_path
+
+
+def failing(capsys, *arguments):
+    """Run a command that must fail; returns the exit code and the one line of error."""
+    before = {p.name for p in os.scandir(".")}
+    code = main(arguments)
+    out, err = capsys.readouterr()
+    assert {p.name for p in os.scandir(".")} == before, "a file was left behind"
+    assert out == ""
+    assert "Traceback" not in err and "internal error" not in err
+    lines = [line for line in err.splitlines() if not line.startswith("stretchmap: warning: ")]
+    assert len(lines) == 1 and lines[0].startswith("stretchmap: error: "), err
+    return code, lines[0].removeprefix("stretchmap: error: ")
+
+
+@pytest.mark.parametrize("command", ["conformal", "area", "volume"])
+def test_map_commands_write_the_map_and_the_report(folder, capsys, solid, command):
+    assert main([command, "solid.npz", "-o", "map.npz", "--json", "map.json"]) == 0
+    out = capsys.readouterr().out
+    report = json.loads((folder / "map.json").read_text())
+    assert REPORT_KEYS <= report.keys()
+    assert {"R", "r"} == report["torus"].keys()
+    assert {"stretchmap", "python", "numpy", "scipy"} <= report["versions"].keys()
+    total = report["seconds"].pop("total")
+    assert {"read"} < report["seconds"].keys()
+    assert 0.0 < sum(report["seconds"].values()) <= total
+    assert "written to map.npz" in out and "ring sd" in out
+    assert report["flips"] == 0 and report["certified"] is True
+
+    with np.load("map.npz") as data:
+        arrays = dict(data)
+    source = solid if command == "volume" else solid.surface
+    assert np.array_equal(arrays["V"][: source.n_vertices], source.V)
+    assert arrays["image"].shape == arrays["V"].shape
+    assert ("T" in arrays) == (command == "volume")
+    again = sm.distortion(
+        TetMesh(arrays["V"], arrays["T"]) if "T" in arrays else TriMesh(arrays["V"], arrays["F"]),
+        arrays["image"],
+    )
+    assert report["ring_sd"] == pytest.approx(again.ring_sd, rel=1e-12)
+    assert report["n_elements"] == len(again.ratios)
+
+
+def test_area_of_a_solid_is_that_of_its_boundary(folder, solid):
+    assert main(["area", "solid.npz", "-o", "a.npz", "-q"]) == 0
+    assert main(["area", "surface.ply", "-o", "b.npz", "-q"]) == 0
+    with np.load("a.npz") as a, np.load("b.npz") as b:
+        assert np.array_equal(a["image"], b["image"])
+
+
+def test_quiet_prints_nothing(folder, capsys):
+    assert main(["conformal", "surface.ply", "-o", "map.npz", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".vtu", ".vtk", ".obj", ".ply"])
+def test_every_output_format_is_read_back(folder, suffix):
+    if suffix in (".vtu", ".vtk"):
+        pytest.importorskip("meshio")
+    vsem = ["--c", "1", "--max-iter", "2", "-q"]
+    assert main(["volume", "solid.npz", "-o", f"map{suffix}", *vsem]) == 0
+    mesh = sm.read(f"map{suffix}")
+    assert isinstance(mesh, TetMesh if suffix in (".npz", ".vtu", ".vtk") else TriMesh)
+
+
+def test_vsem_that_did_not_converge_says_so_and_succeeds(folder, capsys):
+    code = main(["volume", "solid.npz", "-o", "m.npz", "--c", "0", "--max-iter", "1", "-q",
+                 "--tol", "0", "--json", "m.json"])  # fmt: skip
+    report = json.loads((folder / "m.json").read_text())
+    err = capsys.readouterr().err
+    assert code == 0
+    assert report["converged"] is False and report["iterations"] == 1
+    assert "not converged: most iterations done" in err
+
+
+def test_a_run_goes_on_from_a_saved_map(folder):
+    assert main(["volume", "solid.npz", "-o", "a.npz", "--max-iter", "3", "-q"]) == 0
+    assert main(["volume", "solid.npz", "-o", "b.npz", "--start", "a.npz", "-q"]) == 0
+    first, second = sm.load_map("a.npz"), sm.load_map("b.npz")
+    assert second.distortion.element_sd <= first.distortion.element_sd
+    assert np.array_equal(first.solid.T, second.solid.T)
+
+
+def test_start_from_another_solids_map_is_refused(folder, capsys):
+    sm.write("other.npz", samples.solid_torus(2500))
+    assert main(["volume", "other.npz", "-o", "o.npz", "--c", "0", "--max-iter", "1", "-q"]) == 0
+    capsys.readouterr()
+    code, message = failing(capsys, "volume", "solid.npz", "-o", "x.npz", "--start", "o.npz")
+    assert code == 2 and "not a map of this solid" in message
+
+
+def defect_files():
+    V, F = shapes.torus()
+    bad_point = V.copy()
+    bad_point[5, 1] = np.nan
+    far = F.copy()
+    far[7, 2] = len(V)
+    ball, double = samples.ball(2), samples.solid_double_torus(1)
+    tets = samples.solid_torus(600)
+    turned = tets.T.copy()
+    turned[3, 2:] = turned[3, :1:-1]
+    return {
+        "sphere": ("area", V_F(samples.sphere(2)), "genus 0"),
+        "genus-two": ("area", V_F(samples.double_torus(1)), "genus 2"),
+        "open": ("area", (V, F[1:]), "on a border; close the holes"),
+        "NaN": ("area", (bad_point, F), "NaN or infinite coordinates at vertex 5"),
+        "index": ("area", (V, far), "96"),
+        "inside-out": ("area", (V, F[:, ::-1]), "inside out"),
+        "solid ball": ("volume", (ball.V, ball.T), "genus 0"),
+        "solid genus-two": ("volume", (double.V, double.T), "genus 2"),
+        "inverted tet": ("volume", (tets.V, turned), "oriented against the solid"),
+    }
+
+
+def V_F(mesh):
+    return mesh.V, mesh.F
+
+
+@pytest.mark.parametrize("name", defect_files())
+def test_defects_have_messages_of_their_own_and_exit_2(folder, capsys, name):
+    command, (V, elements), expected = defect_files()[name]
+    np.savez("bad.npz", V=V, **{"T" if elements.shape[1] == 4 else "F": elements})
+    code, message = failing(capsys, command, "bad.npz", "-o", "x.npz", "--json", "x.json")
+    assert code == 2
+    assert expected in message
+
+
+def test_orientation_is_repaired_on_request(folder, capsys):
+    V, F = shapes.torus()
+    np.savez("bad.npz", V=V, F=F[:, ::-1])
+    code, message = failing(capsys, "area", "bad.npz", "-o", "x.npz")
+    assert code == 2 and "--orient" in message
+    assert main(["area", "bad.npz", "-o", "x.npz", "--orient", "-q"]) == 0
+    assert "elements turned" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["volume", "absent.npz", "-o", "x.npz"], "absent.npz: No such file"),
+        (["volume", "solid.npz", "-o", "x.foo"], "x.foo: cannot write .foo"),
+        (["volume", "solid.npz", "-o", "x"], "without suffix"),
+        (["volume", "solid.npz", "-o", "absent/x.npz"], "no such folder"),
+        (["volume", "solid.npz", "-o", "solid.npz"], "would be replaced"),
+        (["volume", "solid.npz", "-o", "x.npz", "--json", "x.npz"], "would be replaced"),
+        (["volume", "solid.npz", "-o", "x.npz", "--json", "absent/x.json"], "no such folder"),
+        (["volume", "solid.npz"], "--output"),
+        (["volume", "solid.npz", "-o", "x.npz", "--ratio", "0.5"], "above 1"),
+        (["volume", "solid.npz", "-o", "x.npz", "--ratio", "wide"], "'wide'"),
+        (["volume", "solid.npz", "-o", "x.npz", "--c", "-1"], "not negative"),
+        (["volume", "solid.npz", "-o", "x.npz", "--c", "much"], "'--c'"),
+        (["volume", "solid.npz", "-o", "x.npz", "--method", "magic"], "magic"),
+        (["volume", "solid.npz", "-o", "x.npz", "--c", "1", "--boundary", "glide"], "boundary"),
+        (["volume", "surface.ply", "-o", "x.npz"], "stretchmap tet surface.ply"),
+        (["tet", "solid.npz", "-o", "x.npz"], "a solid already"),
+        (["tet", "surface.ply", "-o", "x.obj"], "cannot write .obj"),
+        (["plot", "solid.npz", "-o", "x.png"], "image"),
+        (["plot", "solid.npz", "-o", "x.gif"], "cannot write .gif"),
+        (["report", "solid.npz", "-o", "x.txt"], "cannot write .txt"),
+        (["certify", "surface.ply"], "not a readable .npz"),
+        (["certify", "solid.npz"], "image"),
+        (["nothing"], "nothing"),
+        (["info", "--bogus"], "--bogus"),
+    ],
+)  # fmt: skip
+def test_misuse_is_one_sentence_and_exit_2(folder, capsys, arguments, expected):
+    code, message = failing(capsys, *arguments)
+    assert code == 2
+    assert expected in message
+
+
+def test_a_read_only_folder_is_refused_before_the_work(folder, capsys, monkeypatch):
+    monkeypatch.setattr("stretchmap.cli.common._writable", lambda path: False)
+    started = time.perf_counter()
+    code, message = failing(capsys, "volume", "solid.npz", "-o", "x.npz")
+    assert code == 2 and "x.npz: cannot be written" in message
+    assert time.perf_counter() - started < 5.0
+
+
+def test_what_fails_while_computing_exits_1(folder, capsys, monkeypatch):
+    def give_up(*arguments, **options):
+        raise CertificationError("not certified: 1 tet (7); keep_best=True returns it", [7])
+
+    monkeypatch.setattr("stretchmap.volume.map.volume_map", give_up)
+    code, message = failing(capsys, "volume", "solid.npz", "-o", "x.npz", "--json", "x.json")
+    assert code == 1
+    assert "1 tet (7)" in message and "--keep-best" in message
+
+
+def test_no_output_without_its_report(folder, capsys, monkeypatch):
+    def full(self, path):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr("stretchmap.maps.result.MapResult.save", full)
+    code, message = failing(capsys, "conformal", "surface.ply", "-o", "x.npz", "--json", "x.json")
+    assert code == 1 and "No space left" in message
+
+
+def test_certify_judges_any_map_file(folder, capsys, solid):
+    np.savez("good.npz", V=solid.V, T=solid.T, image=2.0 * solid.V)
+    assert main(["certify", "good.npz", "--json", "good.json"]) == 0
+    assert "certified" in capsys.readouterr().out
+    folded = np.array(solid.V)
+    inner = np.flatnonzero(solid.boundary_index < 0)[0]
+    folded[inner] += 10.0
+    np.savez("bad.npz", V=solid.V, T=solid.T, image=folded)
+    assert main(["certify", "bad.npz", "--json", "bad.json", "-q"]) == 1
+    assert "image volume not positive" in capsys.readouterr().err
+    good, bad = (json.loads((folder / f).read_text()) for f in ("good.json", "bad.json"))
+    assert good["certified"] and not bad["certified"]
+    assert bad["ids"]["image_positive"]
+
+
+def test_keep_best_keeps_an_uncertified_map_and_still_exits_1(folder, capsys, monkeypatch):
+    from dataclasses import replace
+
+    from stretchmap.volume import map as volume
+
+    real = volume.certify
+
+    def doubt(*arguments):
+        return replace(real(*arguments), certified=False, reason="for want of trust")
+
+    monkeypatch.setattr(volume, "certify", doubt)
+    code, message = failing(capsys, "volume", "solid.npz", "-o", "x.npz", "--max-iter", "1", "-q")
+    assert code == 1 and "for want of trust" in message
+    code = main(["volume", "solid.npz", "-o", "x.npz", "--json", "x.json", "--max-iter", "1", "-q",
+                 "--keep-best"])  # fmt: skip
+    assert code == 1
+    assert "best map kept in x.npz" in capsys.readouterr().err
+    assert json.loads((folder / "x.json").read_text())["certified"] is False
+    assert sm.load_map("x.npz").solid is not None
+
+
+def test_info_lists_every_defect_and_reads_what_cannot_be_mapped(folder, capsys):
+    V, F = shapes.torus()
+    np.savez("bad.npz", V=np.vstack([V, [[9.0, 9.0, 9.0]]]), F=F[1:])
+    assert main(["info", "bad.npz", "--json", "bad.json"]) == 0
+    out = capsys.readouterr().out
+    report = json.loads((folder / "bad.json").read_text())
+    assert {d["name"] for d in report["defects"]} == {"border_edges", "unreferenced"}
+    assert report["usable"] is False and report["reason"]
+    assert "can be mapped to the torus: no" in out
+    assert main(["info", "solid.npz"]) == 0
+    assert "can be mapped to the torus: yes" in capsys.readouterr().out
+
+
+def test_homology_of_any_genus(folder, capsys):
+    sm.write("two.npz", samples.solid_double_torus(1))
+    assert main(["homology", "two.npz", "-o", "loops.npz", "--json", "loops.json"]) == 0
+    report = json.loads((folder / "loops.json").read_text())
+    assert report["genus"] == 2 and len(report["handle_lengths"]) == 2
+    with np.load("loops.npz") as data:
+        assert {"handle_0", "handle_1", "tunnel_0", "tunnel_1"} <= set(data.files)
+    assert "genus" in capsys.readouterr().out
+
+
+def test_tet_fills_a_surface(folder, solid):
+    pytest.importorskip("tetgen")
+    assert main(["tet", "surface.ply", "-o", "filled.npz", "-q"]) == 0
+    filled = sm.read("filled.npz")
+    assert isinstance(filled, TetMesh)
+    assert filled.volume == pytest.approx(solid.volume, rel=1e-6)
+    filled.require_solid_torus()
+
+
+def test_plot_and_report_of_a_map(folder):
+    pytest.importorskip("matplotlib")
+    assert main(["volume", "solid.npz", "-o", "m.npz", "--max-iter", "2", "-q"]) == 0
+    assert main(["plot", "m.npz", "-o", "p.png", "--kind", "convergence"]) == 0
+    assert (folder / "p.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["report", "m.npz", "-o", "r.html"]) == 0
+    page = (folder / "r.html").read_text()
+    assert page.count("data:image/png;base64,") == 7
+    assert "Certified" in page
+    assert "://" not in page and 'src="data:' in page
+    assert "spread of the ratios per vertex" in page
+
+
+def test_plot_options_belong_to_their_kinds(folder, capsys):
+    pytest.importorskip("matplotlib")
+    assert main(["volume", "solid.npz", "-o", "m.npz", "--c", "1", "--max-iter", "1", "-q"]) == 0
+    assert main(["plot", "m.npz", "-o", "u.png", "--kind", "levels", "--by", "u"]) == 0
+    assert main(["plot", "m.npz", "-o", "c.svg", "--kind", "cutaway", "--colour", "ratio"]) == 0
+    capsys.readouterr()
+    assert main(["plot", "m.npz", "-o", "x.png", "--kind", "loops", "--by", "u"]) == 2
+    assert "has no option 'by'" in capsys.readouterr().err
+    assert main(["plot", "m.npz", "-o", "x.png", "--kind", "registration"]) == 2
+    assert "needs a registration" in capsys.readouterr().err
+    assert not (folder / "x.png").exists()
+
+
+def test_demo_needs_no_data(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    out, report = tmp_path / "out", tmp_path / "demo.json"
+    assert main(["demo", "-o", str(out), "--json", str(report)]) == 0
+    assert {p.name for p in out.iterdir()} == {"map.npz", "ratios.png", "torus.png"}
+    assert "ring sd" in capsys.readouterr().out
+    figures = json.loads(report.read_text())
+    assert figures["certified"] and figures["flips"] == 0
+
+
+def test_help_names_every_command_and_version(capsys):
+    assert main([]) == 0
+    out = capsys.readouterr().out
+    assert "..." not in out.split("Commands:")[1]
+    for command in ("info", "homology", "tet", "conformal", "area", "volume", "certify", "plot",
+                    "report", "demo", "coordinates", "register", "partition", "resample",
+                    "morph"):  # fmt: skip
+        assert f"\n  {command} " in out
+        assert main([command, "--help"]) == 0
+    capsys.readouterr()
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == f"stretchmap {sm.__version__}"
+
+
+def test_groups_are_modules_with_register():
+    import importlib
+
+    for group in GROUPS:
+        assert callable(importlib.import_module(f"stretchmap.cli.{group}").register)
+
+
+def test_python_words_become_options():
+    text = "pass orient=True, or method='certified' (keep_best=True); compact() does"
+    assert in_words_of_the_command_line(text) == (
+        "pass --orient, or --method certified (--keep-best); --compact does"
+    )
+
+
+def test_unexpected_errors_are_one_line_too(capsys, monkeypatch):
+    monkeypatch.delenv("STRETCHMAP_DEBUG", raising=False)
+
+    def broken():
+        raise ZeroDivisionError("two\nlines")
+
+    assert guarded(broken) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_without_typer_the_pip_line_and_exit_2():
+    script = (
+        "import sys; sys.modules['typer'] = None\n"
+        "from stretchmap.cli import main; sys.exit(main(['info', 'x']))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENV)
+    assert run.returncode == 2
+    assert "pip install 'stretchmap[cli]'" in run.stderr and run.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def test_interrupting_exits_130_at_once_without_traceback(tmp_path):
+    sm.write(tmp_path / "big.npz", samples.vertebra_like(120_000))
+    run = subprocess.Popen(
+        [sys.executable, "-m", "stretchmap.cli", "volume", "big.npz", "-o", "map.npz"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ENV,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    time.sleep(2.0)
+    run.send_signal(signal.SIGINT)
+    sent = time.perf_counter()
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130, err
+    assert time.perf_counter() - sent < 5.0
+    assert "Traceback" not in err and "interrupted" in err
+    assert {p.name for p in tmp_path.iterdir()} == {"big.npz"}
+
+
+def test_a_long_call_that_never_returns_to_python_is_ended_too():
+    script = (
+        "import os, signal, threading, time\n"
+        "from stretchmap.cli.guard import guarded\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()\n"
+        "def deaf():\n"
+        "    while True:\n"
+        "        try: time.sleep(20.0)\n"
+        "        except KeyboardInterrupt: pass\n"
+        "guarded(deaf)\n"
+    )
+    started = time.perf_counter()
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENV)
+    assert run.returncode == 130
+    assert time.perf_counter() - started < 15.0
+    assert run.stderr == "stretchmap: interrupted\n"
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    script = (
+        "import sys, stretchmap, stretchmap.cli\n"
+        "heavy = {'scipy', 'matplotlib', 'pyvista', 'meshio', 'typer', 'rich'}\n"
+        "sys.exit(', '.join(heavy & sys.modules.keys()) or 0)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENV)
+    assert run.returncode == 0, run.stderr

@@ -1,0 +1,69 @@
+"""The README holds what it promises: its snippets run, its commands exist, its picture is there."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from stretchmap.cli import main
+
+ROOT = Path(__file__).resolve().parents[3]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
+
+
+def test_python_snippets_run_one_after_the_other(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    snippets = blocks("python")
+    assert len(snippets) >= 3
+    for snippet in snippets:
+        exec(compile(snippet, "README.md", "exec"), names)
+    assert {"part_map.npz", "part.png"} <= {p.name for p in tmp_path.iterdir()}
+    assert "certified" in capsys.readouterr().out
+
+
+def test_ci_runs_the_readmes_test_command():
+    demo, tests = (block.strip() for block in blocks("sh"))
+    assert "\n" not in demo and "\n" not in tests
+    assert tests.endswith("-m pytest") and demo.endswith("stretchmap demo")
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert script.splitlines().count(tests) == 1
+
+
+def test_every_command_of_the_table_exists(capsys):
+    pytest.importorskip("typer")
+    commands = {line.split()[1] for line in re.findall(r"`(stretchmap \w[^`]*)`", README)}
+    assert {"volume", "demo", "certify"} <= commands
+    for command in commands:
+        assert main([command, "--help"]) == 0
+        help_text = capsys.readouterr().out
+        for line in re.findall(rf"`(stretchmap {command}\b[^`]*)`", README):
+            for option in shlex.split(line.replace("[", " ").replace("]", " ")):
+                if option.startswith("-"):
+                    assert re.search(rf"(^|[\s,]){option}\b", help_text), f"{command} {option}"
+
+
+def test_local_links_lead_somewhere():
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        if "://" not in target:
+            assert (ROOT / target).exists(), target
+
+
+def test_the_picture_is_small_and_can_be_drawn_again(tmp_path):
+    pytest.importorskip("matplotlib")
+    picture = ROOT / "docs" / "map.png"
+    assert picture.stat().st_size < 300_000
+    spec = importlib.util.spec_from_file_location("pictures", ROOT / "docs" / "make_pictures.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    drawn = module.main(n_tets=6_000, folder=tmp_path)
+    assert drawn.read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,170 @@
+"""Partitions against the closed forms of the standard solid torus and exact invariants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from shapes import a_map
+from stretchmap import _core, samples
+from stretchmap.errors import ArrayError, OptionError
+from stretchmap.partitions.parts import partition
+
+RNG = np.random.default_rng(3)
+
+
+@pytest.fixture(scope="module")
+def standard():
+    solid = samples.solid_torus(20_000, R=3.0, r=1.0)
+    return a_map(solid, solid.V, sm.Torus(3.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def bumpy_map():
+    return sm.volume_map(samples.bumpy_torus(6000))
+
+
+def check(result, parts):
+    """Exact invariants of every partition."""
+    solid = parts.solid
+    total = result.mesh.volume
+    assert solid.tet_volumes.min() > 0.0
+    assert np.array_equal(solid.V[: result.mesh.n_vertices], result.mesh.V)
+    assert parts.volumes.sum() == pytest.approx(total, rel=1e-13)
+    children = np.bincount(parts.parent_tet, solid.tet_volumes)
+    assert np.allclose(children, result.mesh.tet_volumes, rtol=1e-9, atol=1e-12 * total)
+    assert solid.surface.volume == pytest.approx(total, rel=1e-12)
+    assert not [d.name for d in solid.diagnose().defects if d.name != "degenerate"]
+    for i in range(parts.n_parts):
+        part = parts.part(i)
+        closed = part.surface
+        assert len(closed.diagnose().border_edges) == 0
+        assert closed.volume == pytest.approx(parts.volumes[i], rel=1e-12)
+
+
+@pytest.mark.parametrize("by", ["s", "u", "v"])
+def test_fifths_are_exact(bumpy_map, by):
+    parts = partition(bumpy_map, 5, by)
+    check(bumpy_map, parts)
+    assert np.abs(parts.errors).max() < 1e-12
+    raw = partition(bumpy_map, 5, by, correct=False)
+    check(bumpy_map, raw)
+    assert np.allclose(raw.errors, parts.uncorrected_errors, atol=1e-12)
+    assert 0.0 < np.abs(raw.errors).max() < 0.05
+    expected = np.cumsum(raw.volumes)[:-1] / (np.arange(1, 5) / 5 * bumpy_map.solid.volume) - 1
+    assert np.allclose(parts.cumulative_errors, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("by", ["s", "u", "v"])
+def test_unequal_shares_and_another_start(bumpy_map, by):
+    shares = [0.55, 0.05, 0.3, 0.1]
+    parts = partition(bumpy_map, shares, by, start=1.0)
+    check(bumpy_map, parts)
+    assert np.allclose(parts.volumes / bumpy_map.solid.volume, shares, rtol=1e-12)
+
+
+@pytest.mark.parametrize("by", ["u", "v"])
+@pytest.mark.parametrize("start", [0.0, np.pi / 4])
+def test_halves_and_levels_through_vertices(standard, by, start):
+    """The structured mesh has vertices exactly on these sheets."""
+    parts = partition(standard, 2, by, start=start)
+    check(standard, parts)
+    assert np.abs(parts.errors).max() < 1e-12
+
+
+def test_sectors_of_the_standard_torus_are_where_they_should_be(standard):
+    parts = partition(standard, 4, "u")
+    assert np.allclose(parts.levels[0], np.arange(4) * np.pi / 2, atol=1e-6)
+    centres = parts.image[parts.solid.T].mean(axis=1)
+    u = np.arctan2(centres[:, 1], centres[:, 0]) % (2 * np.pi)
+    assert np.array_equal(parts.labels, np.floor(u / (np.pi / 2)).astype(int))
+
+
+def test_shells_of_the_standard_torus():
+    """2 pi^2 R s^2 lies within s: the share is s^2 / r^2 up to the polyhedron's error."""
+    torus, offsets = sm.Torus(3.0, 1.0), []
+    for count in (6000, 48_000):
+        solid = samples.solid_torus(count, R=3.0, r=1.0)
+        parts = partition(a_map(solid, solid.V, torus), [0.25, 0.75], "s")
+        offsets.append(abs(parts.levels[0][0] - 0.25))
+        shell = parts.interface(0, 1)
+        assert shell.genus == 1
+        assert shell.volume == pytest.approx(parts.volumes[0], rel=1e-12)
+    s = torus.coordinates(shell.V)[2]
+    assert offsets[1] < 0.4 * offsets[0] < 0.02
+    assert s.mean() == pytest.approx(0.5, abs=0.01) and s.std() < 0.02
+
+
+def test_sectors_around_the_tube_follow_the_closed_form(standard):
+    """Volume up to v: 2 pi (R r^2 v / 2 + r^3 sin(v) / 3)."""
+    parts = partition(standard, 3, "v")
+    v = parts.levels[0][1:]
+    share = (1.5 * v + np.sin(v) / 3.0) / (3.0 * np.pi)
+    assert np.allclose(share, [1 / 3, 2 / 3], atol=2e-3)
+
+
+def test_grid_of_cells(bumpy_map):
+    parts = partition(bumpy_map, (3, [0.5, 0.5], 2), ("u", "s", "v"))
+    check(bumpy_map, parts)
+    cells = parts.volumes.reshape(3, 2, 2) / bumpy_map.solid.volume
+    assert np.allclose(cells.sum(axis=(1, 2)), 1 / 3, rtol=1e-11)
+    assert np.allclose(cells.sum(axis=(0, 2)), 1 / 2, rtol=1e-11)
+    assert np.allclose(cells.sum(axis=(0, 1)), 1 / 2, rtol=1e-11)
+    assert np.abs(parts.errors).max() < 0.1
+
+
+def test_cutting_one_tet_gives_the_share_of_the_formula():
+    T = np.array([[0, 1, 2, 3]], np.int32)
+    V = np.vstack([np.zeros(3), np.eye(3)])
+    for trial in range(300):
+        values = RNG.standard_normal(4)
+        if trial % 3 == 0:
+            values[RNG.integers(4)] = 0.0
+        if trial % 6 == 0:
+            values[RNG.integers(4)] = 0.0
+        split = _core.split_tets(T, values, np.zeros(0))
+        a, b = split.cut_edges.T
+        w = split.cut_weight[:, None]
+        points = np.concatenate([V, (1 - w) * V[a] + w * V[b]])
+        volumes = _core.tet_volumes(points, split.tets)
+        assert volumes.min() > 0.0 and volumes.sum() == pytest.approx(1 / 6, rel=1e-12)
+        below = volumes[split.side < 0].sum()
+        assert below == pytest.approx(_core.volume_below(T, np.array([1 / 6]), values), abs=1e-13)
+        samples_below = (RNG.dirichlet(np.ones(4), 2000) @ values < 0).mean() / 6
+        assert below == pytest.approx(samples_below, abs=0.01)
+
+
+def test_saving(bumpy_map, tmp_path):
+    parts = partition(bumpy_map, 3)
+    parts.save(tmp_path / "parts.vtu")
+    again = sm.read(tmp_path / "parts.vtu")
+    assert np.array_equal(again.T, parts.solid.T)
+    assert "part 2" in parts.summary() and parts.to_dict()["by"] == ["s"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"fractions": 1},
+        {"fractions": [0.5, 0.6]},
+        {"fractions": [1.5, -0.5]},
+        {"fractions": [[0.5], [0.5]]},
+        {"by": "x"},
+        {"by": ("u", "u"), "fractions": (2, 2)},
+        {"by": ("u", "s"), "fractions": (2,)},
+        {"start": np.inf},
+    ],
+)
+def test_bad_options_are_named(bumpy_map, options):
+    with pytest.raises(OptionError):
+        partition(bumpy_map, **options)
+
+
+def test_maps_without_torus_or_of_surfaces_are_refused(bumpy_map):
+    with pytest.raises(OptionError):
+        partition(a_map(bumpy_map.solid, bumpy_map.image))
+    with pytest.raises(ArrayError):
+        partition(sm.area_map(bumpy_map.solid.surface))
+    with pytest.raises(OptionError):
+        partition(bumpy_map, 2).part(2)

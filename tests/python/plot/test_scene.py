@@ -1,0 +1,69 @@
+"""Scenes by PyVista; drawn in processes of their own, since a missing OpenGL aborts the process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import stretchmap as sm
+from stretchmap import samples
+from stretchmap.errors import ArrayError, FileFormatError, MissingDependencyError, OptionError
+from stretchmap.plot import scene
+
+ENV = {**os.environ, "PYTHONPATH": str(Path(sm.__file__).parents[1])}
+
+
+@pytest.fixture(scope="module")
+def area():
+    return sm.area_map(samples.bumpy_torus(1500).surface, finish="none")
+
+
+_IMPORTS = "from stretchmap import samples\nfrom stretchmap.plot import scene"
+
+
+def drawn(body, folder):
+    """Run Python code that saves a scene as x.png; skips where nothing can be drawn."""
+    pytest.importorskip("pyvista")
+    probe = "import pyvista; pyvista.Plotter(off_screen=True).screenshot('probe.png')"
+    for code in (
+        probe,
+        f"{_IMPORTS}\n{body}",
+    ):
+        run = subprocess.run(
+            [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, env=ENV
+        )
+        if code is probe and run.returncode:
+            pytest.skip("PyVista cannot draw here")
+    assert run.returncode == 0, run.stderr
+    return (folder / "x.png").read_bytes()
+
+
+def test_a_cut_is_drawn(tmp_path):
+    picture = drawn(
+        "m = sm.volume_map(samples.bumpy_torus(1500), c=1, max_iter=1)\n"
+        "scene.save(scene.cut(m, 'ratio'), 'x.png')",
+        tmp_path,
+    )
+    assert picture.startswith(b"\x89PNG") and len(picture) > 10_000
+
+
+def test_loops_are_drawn(tmp_path):
+    picture = drawn("scene.save(scene.loops(samples.double_torus(1)), 'x.png')", tmp_path)
+    assert picture.startswith(b"\x89PNG") and len(picture) > 10_000
+
+
+def test_wrong_requests_are_refused(area, monkeypatch):
+    with pytest.raises(ArrayError, match="solid"):
+        scene.cut(area)
+    solid = sm.volume_map(samples.bumpy_torus(1500), c=1, max_iter=0)
+    with pytest.raises(OptionError, match="coordinate, ratio"):
+        scene.cut(solid, "red")
+    with pytest.raises(FileFormatError, match=r"\.png"):
+        scene.save(None, "x.jpg")
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(MissingDependencyError, match=r"stretchmap\[viz\]"):
+        scene.cut(solid)

@@ -1,0 +1,152 @@
+"""Volumes between level surfaces: shifts and targets against a known distortion and exact cuts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap import _core, samples
+from stretchmap.volume.flip_free import FlipFreeSolver
+from stretchmap.volume.marginals import Marginals
+from stretchmap.volume.options import FlipFreeOptions
+
+TORUS = sm.Torus(3.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def solid():
+    return samples.solid_torus(60_000, R=3.0, r=1.0)
+
+
+def marginals(solid, held=False):
+    shares = solid.tet_volumes / solid.volume
+    return Marginals(solid.T, shares, solid.boundary_vertices, TORUS, held=held)
+
+
+def distorted(solid, axis):
+    """The source moved by a smooth function of one coordinate."""
+    u, v, s = TORUS.coordinates(solid.V)
+    if axis == "s":
+        return TORUS.xi(u, v, s * (1.0 + 0.05 * (1.0 - s)))
+    if axis == "u":
+        return TORUS.xi(u + 0.03 * np.sin(u), v, s)
+    return TORUS.xi(u, v + 0.03 * np.sin(2.0 * v), s)
+
+
+@pytest.mark.parametrize("axis", ["s", "u", "v"])
+def test_a_known_shift_along_one_coordinate_is_undone(solid, axis):
+    tool = marginals(solid)
+    moved = distorted(solid, axis)
+    first = tool.error(tool.measure(moved))
+    back = moved
+    for _ in range(4):
+        back = tool.shifted(back)
+    assert first > 0.004
+    assert tool.error(tool.measure(back)) < 0.05 * first
+    # The constant of a turn is free, and the mean of the levels' shifts is not that of the volume.
+    before = np.linalg.norm(moved - solid.V, axis=1).max()
+    assert np.linalg.norm(back - solid.V, axis=1).max() < 0.25 * before
+
+
+def test_error_of_a_turn_is_what_the_shift_says(solid):
+    """u + 0.03 sin u moves the share 0.03 sin(u) / (2 pi) of the volume past the level u."""
+    tool = marginals(solid)
+    assert tool.error(tool.measure(distorted(solid, "u"))) == pytest.approx(
+        0.03 / (2.0 * np.pi), rel=0.05
+    )
+
+
+def test_the_torus_is_mapped_to_itself_and_a_held_boundary_stays(solid):
+    ids = solid.boundary_vertices
+    moved = distorted(solid, "u")
+    free = marginals(solid).shifted(moved)
+    assert np.abs(TORUS.coordinates(free[ids])[2] - 1.0).max() < 1e-12
+    assert np.abs(free[ids] - moved[ids]).max() > 1e-3
+    moved = distorted(solid, "s")
+    held = marginals(solid, held=True).shifted(moved)
+    assert np.array_equal(held[ids], moved[ids])
+    assert np.abs(held - moved).max() > 1e-3
+
+
+@pytest.mark.parametrize("axis", ["s", "u", "v"])
+def test_targets_ask_for_what_is_missing_and_add_up(solid, axis):
+    """Asked of every tet, they are the image's volumes seen from the source, layer by layer."""
+    tool = marginals(solid)
+    moved = distorted(solid, axis)
+    targets = tool.targets(tool.measure(moved))
+    volumes = _core.signed_tet_volumes(moved, solid.T)
+    ratio = tool.shares / (volumes / volumes.sum())
+    # Exact up to the width of a bin; the distortion is a function of one coordinate.
+    assert np.corrcoef(targets, ratio)[0, 1] > 0.8
+    again = tool.targets(tool.measure(moved))
+    assert np.allclose(again - 1.0, 2.0 * (targets - 1.0), atol=1e-12)
+
+
+def test_targets_are_reached_by_the_energy(solid):
+    """set_targets moves the minimum: det J = 1 where the volume is the target's share."""
+    V, T = solid.V, solid.T
+    shares = solid.tet_volumes / solid.volume
+    motion = np.ones(len(V), np.uint8)  # all fixed but one
+    motion[np.setdiff1d(np.arange(len(V)), solid.boundary_vertices)[0]] = 0
+    newton = _core.SolidNewton(
+        T, _core.rest_matrices(V, T, 1e6), shares, motion, 3.0, 1.0, V,
+        np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0),
+    )  # fmt: skip
+    weights = _core.EnergyWeights(0.0, 1.0, 0.0, 0.0)
+    assert newton.value(V, weights).energy == pytest.approx(0.0, abs=1e-12)
+    target = np.linspace(0.5, 2.0, len(T))
+    newton.set_targets(target)
+    det = 1.0 / target
+    expected = shares @ (0.5 * (det + 1.0 / det) - 1.0)
+    assert newton.value(V, weights).energy == pytest.approx(expected, rel=1e-10)
+    newton.set_targets(np.ones(len(T)))
+    assert newton.value(V, weights).energy == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(sm.errors.ArrayError):
+        newton.set_targets(np.zeros(len(T)))
+
+
+def test_uncorrected_fifths_of_a_vertebra(load_solid):
+    """The paper's cumulative errors for fifths, Table 7.1, are 0.06 to 0.17 per cent."""
+    result = sm.volume_map(load_solid("vertebra_L3_ssm_16420"))
+    assert result.certificate.certified
+    for by in "suv":
+        parts = sm.partition(result, 5, by)
+        assert np.abs(parts.uncorrected_errors).max() < 1e-3
+        assert np.abs(parts.errors).max() < 1e-12
+
+
+def test_few_tets_do_no_harm():
+    small = samples.solid_torus(400, R=3.0, r=1.0)
+    moved = marginals(small).shifted(small.V)
+    assert (_core.signed_tet_volumes(moved, small.T) > 0.0).all()
+
+
+def test_the_histogram_counts_every_tet_at_four_points(solid):
+    values = np.ascontiguousarray(TORUS.coordinates(solid.V)[2] ** 2)
+    amounts = np.column_stack([solid.tet_volumes, np.ones(solid.n_tets)])
+    far = (5.0 - np.sqrt(5.0)) / 20.0
+    weights = np.full((4, 4), far) + np.eye(4) * (1.0 - 4.0 * far)
+    bins = np.clip((values[solid.T] @ weights * 20.0).astype(int), 0, 19).ravel()
+    found = _core.level_histogram(solid.T, values, amounts, 20, 1.0, False)
+    for column, amount in zip(found.T, amounts.T, strict=True):
+        expected = np.bincount(bins, np.repeat(0.25 * amount, 4), minlength=20)
+        # A point on the border of two bins may fall into either.
+        assert np.abs(np.cumsum(column) - np.cumsum(expected)).max() < 1e-3 * amount.sum()
+        assert column.sum() == pytest.approx(amount.sum(), rel=1e-12)
+
+
+def test_equalising_takes_no_more_than_a_fifth_of_a_tet(solid):
+    ids = solid.boundary_vertices
+    solver = FlipFreeSolver(
+        V=solid.V, T=solid.T, boundary=ids, faces=ids[solid.surface.F], R=3.0, r=1.0,
+        options=FlipFreeOptions(),
+    )  # fmt: skip
+    moved = solid.V + np.random.default_rng(0).normal(scale=0.01, size=solid.V.shape)
+    kept = solver._gently_moved(solid.V, moved, solid.tet_volumes)
+    ratios = _core.signed_tet_volumes(kept, solid.T) / solid.tet_volumes
+    assert ratios.min() > 0.8 and ratios.max() < 1.25
+    ratios = _core.signed_tet_volumes(moved, solid.T) / solid.tet_volumes
+    assert ratios.min() < 0.8 or ratios.max() > 1.25
+    went = (kept != solid.V).any(axis=1)
+    assert went.any() and not went.all() and np.array_equal(kept[went], moved[went])

@@ -1,0 +1,316 @@
+"""Volume maps: Algorithm 5.1 against oracles, and the certified route."""
+
+from __future__ import annotations
+
+import functools
+from itertools import pairwise
+
+import igl
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import stretchmap as sm
+from stretchmap import _core, samples
+from stretchmap.errors import DegenerateError, OptionError
+from stretchmap.mesh.meshes import TetMesh
+from stretchmap.volume import vsem
+
+RNG = np.random.default_rng(11)
+
+
+@pytest.fixture(scope="module")
+def bumpy():
+    return samples.bumpy_torus(4000)
+
+
+def boundary_flags(solid):
+    fixed = np.zeros(solid.n_vertices, np.uint8)
+    fixed[solid.boundary_vertices] = 1
+    return fixed
+
+
+def laplacian_pair(T, fixed, rest, geometry, c, x, **options):
+    """L_II and -L_IB x_B, rows in the order of the vertices."""
+    matrix, rhs, rows = _core.tet_laplacian(T, fixed, rest, geometry, c, x, **options)
+    order = np.argsort(rows)
+    assert (rows[order] == np.flatnonzero(fixed == 0)).all()
+    return sp.csr_matrix(matrix)[order][:, order], rhs[order]
+
+
+def full_laplacian(V, T, rest, geometry=None, c=0.0):
+    """Every vertex free, so that L_II is all of L."""
+    held = np.zeros(len(V), np.uint8)
+    return laplacian_pair(T, held, rest, V if geometry is None else geometry, c, V)[0]
+
+
+def dihedral_laplacian(V, T):
+    """(5.8) as printed: sixths of edge lengths times cotangents of opposite dihedral angles."""
+    rows, cols, values = [], [], []
+    for i, j, k, m in [(0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2), (1, 2, 0, 3), (1, 3, 0, 2),
+                       (2, 3, 0, 1)]:  # fmt: skip
+        a, b, c, d = (V[T[:, x]] for x in (i, j, k, m))
+        axis = d - c
+        length = np.linalg.norm(axis, axis=1)
+        e = axis / length[:, None]
+        p = (a - c) - np.einsum("ij,ij->i", a - c, e)[:, None] * e
+        q = (b - c) - np.einsum("ij,ij->i", b - c, e)[:, None] * e
+        cot = np.einsum("ij,ij->i", p, q) / np.linalg.norm(np.cross(p, q), axis=1)
+        w = length * cot / 6.0
+        rows += [T[:, i], T[:, j]]
+        cols += [T[:, j], T[:, i]]
+        values += [-w, -w]
+    n = len(V)
+    L = sp.csr_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))), (n, n)
+    )
+    return L - sp.diags(np.asarray(L.sum(axis=1)).ravel())
+
+
+def test_laplacian_is_libigls_and_the_dihedral_one(bumpy):
+    V, T = bumpy.V, bumpy.T
+    ours = full_laplacian(V, T, bumpy.tet_volumes)
+    scale = np.abs(ours).max()
+    assert np.abs(ours + igl.cotmatrix(V, T)).max() < 1e-12 * scale
+    assert np.abs(ours - dihedral_laplacian(V, T)).max() < 1e-11 * scale
+
+
+def test_laplacian_with_boundary_is_the_matching_part_of_the_full_one(bumpy):
+    V, T = bumpy.V, bumpy.T
+    rest = bumpy.tet_volumes
+    full = full_laplacian(V, T, rest)
+    fixed = boundary_flags(bumpy)
+    x = RNG.standard_normal(V.shape)
+    inner, rhs = laplacian_pair(T, fixed, rest, V, 0.0, x)
+    free, held = np.flatnonzero(fixed == 0), np.flatnonzero(fixed)
+    assert np.abs(inner - full[free][:, free]).max() < 1e-13 * np.abs(full).max()
+    assert np.allclose(rhs, -full[free][:, held] @ x[held], atol=1e-12 * np.abs(full).max())
+
+
+def test_laplacian_does_not_depend_on_the_kernel_or_the_numbering():
+    # Enough vertices for several chunks, numbered at random, and a boundary that splits rows.
+    solid = samples.bumpy_torus(30000)
+    V, T, rest = solid.V, solid.T, solid.tet_volumes
+    shuffle = RNG.permutation(len(V))
+    V2, T2 = np.empty_like(V), shuffle[T].astype(np.int32)
+    V2[shuffle] = V
+    fixed, fixed2 = boundary_flags(solid), np.zeros(len(V), np.uint8)
+    fixed2[shuffle] = fixed
+    args = (T2, fixed2, rest, V2, 3.0, V2)
+    first, first_rhs = laplacian_pair(*args)
+    for lanes in (1, 4):
+        other, other_rhs = laplacian_pair(*args, lanes=lanes)
+        assert np.array_equal(first.data, other.data)
+        assert np.array_equal(first_rhs, other_rhs)
+    # Against the matrix of the mesh as it was numbered before.
+    plain, plain_rhs = laplacian_pair(T, fixed, rest, V, 3.0, V)
+    rank = np.argsort(shuffle[np.flatnonzero(fixed == 0)])
+    scale = np.abs(plain.data).max()
+    assert np.abs(plain[rank][:, rank] - first).max() < 1e-13 * scale
+    assert np.allclose(plain_rhs[rank], first_rhs, atol=1e-13 * scale)
+
+
+@pytest.mark.parametrize("c", [0.0, 10.0])
+def test_inexact_steps_lead_to_the_map_of_exact_ones(c):
+    # 20 steps on one hierarchy of grids or two against exact factors at every step.
+    solid = samples.bumpy_torus(30000)
+    fixed = boundary_flags(solid)
+    V = solid.V / solid.volume ** (1 / 3)
+    start = V + 0.2 * np.sin(3.0 * V[:, [1, 2, 0]])
+    run = functools.partial(
+        vsem.minimise_volumetric_stretch, V, solid.T, fixed, start, c=c, max_iter=20, tol=0.0
+    )
+    ours, exact = run(solver="multigrid"), run(solver="direct")
+    energies = [np.array([r.energy for r in result.history]) for result in (ours, exact)]
+    assert len(energies[0]) == 21 and (np.diff(energies[0]) < 0.0).all()
+    assert energies[0][-1] == pytest.approx(energies[1][-1], rel=1e-7)
+    assert np.abs(ours.image - exact.image).max() < 1e-4
+    assert [r.flips for r in ours.history] == [r.flips for r in exact.history]
+
+
+def test_stretch_energy_identities(bumpy):
+    V, T = bumpy.V, bumpy.T
+    f = V + 0.02 * RNG.standard_normal(V.shape)
+    rest, image = bumpy.tet_volumes, _core.signed_tet_volumes(f, T)
+    L = full_laplacian(V, T, rest, geometry=f)
+    energy = _core.tet_stretch_energy(image, rest)
+    assert energy == pytest.approx(0.5 * np.trace(f.T @ (L @ f)), rel=1e-12)
+    assert energy == pytest.approx(1.5 * (image**2 / rest).sum(), rel=1e-14)
+    assert energy >= 1.5 * image.sum() ** 2 / rest.sum()
+    gradient = _core.tet_stretch_gradient(f, T, rest)
+    assert np.allclose(gradient, 3.0 * (L @ f), atol=1e-12 * np.abs(gradient).max())
+
+
+def test_stretch_gradient_matches_finite_differences(bumpy):
+    T, rest = bumpy.T, bumpy.tet_volumes
+    f = bumpy.V + 0.02 * RNG.standard_normal(bumpy.V.shape)
+    gradient = _core.tet_stretch_gradient(f, T, rest)
+    direction = RNG.standard_normal(f.shape)
+    h = 1e-6
+
+    def energy(x):
+        return _core.tet_stretch_energy(_core.signed_tet_volumes(x, T), rest)
+
+    slope = (energy(f + h * direction) - energy(f - h * direction)) / (2 * h)
+    assert slope == pytest.approx((gradient * direction).sum(), rel=1e-7)
+
+
+def test_affine_images_attain_the_lower_bound(bumpy):
+    A = np.array([[1.2, 0.3, 0.0], [0.0, 0.8, 0.1], [0.2, 0.0, 1.1]])
+    f = np.ascontiguousarray(bumpy.V @ A.T)
+    image = _core.signed_tet_volumes(f, bumpy.T)
+    energy = _core.tet_stretch_energy(image, bumpy.tet_volumes)
+    bound = 1.5 * image.sum() ** 2 / bumpy.tet_volumes.sum()
+    assert energy == pytest.approx(bound, rel=1e-12)
+
+
+@pytest.mark.parametrize("c", [0.0, 10.0])
+def test_vsem_step_solves_the_paper_system(bumpy, c):
+    """One step against an independent assembly and SciPy's direct solver."""
+    V, T = bumpy.V, bumpy.T
+    fixed = boundary_flags(bumpy)
+    x = V.copy()
+    x[fixed == 0] += 0.01 * RNG.standard_normal((int((fixed == 0).sum()), 3))
+    rest = bumpy.tet_volumes
+    stretch = _core.VolumetricStretch(T, fixed, rest, "direct")
+    moved, solved = stretch.step(x, c, 1e-12)
+    # (5.6) folded into the rest volumes.
+    regularised = rest + c * np.abs(_core.signed_tet_volumes(x, T))
+    L = full_laplacian(V, T, regularised, geometry=x)
+    free, held = np.flatnonzero(fixed == 0), np.flatnonzero(fixed)
+    expected = sp.linalg.spsolve(sp.csc_matrix(L[free][:, free]), -L[free][:, held] @ x[held])
+    assert np.allclose(moved[free], expected, atol=1e-9)
+    assert np.array_equal(moved[held], x[held])
+    assert max(solved.residual) < 1e-12
+
+
+def test_vsem_energy_falls_at_every_step_and_flips_are_reported(bumpy):
+    result = sm.volume_map(bumpy, c=0.0, max_iter=8, tol=0.0)
+    energies = [record.energy for record in result.history]
+    assert all(b < a for a, b in pairwise(energies))
+    volumes = _core.signed_tet_volumes(np.ascontiguousarray(result.image), bumpy.T)
+    assert result.distortion.flips == np.count_nonzero(volumes <= 0.0)
+    assert volumes.sum() == pytest.approx(bumpy.volume, rel=1e-12)
+    assert not result.converged and result.stop_reason == "most iterations done"
+
+
+def test_a_large_run_says_how_much_memory_it_needs(bumpy, caplog, monkeypatch):
+    caplog.set_level("INFO", "stretchmap")
+    sm.volume_map(bumpy, c=10.0, max_iter=0)
+    assert "memory" not in caplog.text
+    monkeypatch.setattr("stretchmap.volume.map._LARGE", len(bumpy.T) - 1)
+    monkeypatch.setattr("stretchmap.volume.map._BYTES_PER_TET", {"vsem": 2**30 / len(bumpy.T)})
+    sm.volume_map(bumpy, c=10.0, max_iter=0)
+    assert f"{len(bumpy.T)} tets, method vsem: about 1.0 GiB" in caplog.text
+
+
+def test_solvers_agree(bumpy):
+    images = [
+        sm.volume_map(bumpy, c=10.0, max_iter=5, solver=solver).image
+        for solver in ("direct", "multigrid")
+    ]
+    assert np.abs(images[0] - images[1]).max() < 1e-6 * np.abs(images[0]).max()
+
+
+@pytest.mark.parametrize("boundary", ["frozen", "glide"])
+def test_certified_route_leaves_no_flip(bumpy, boundary):
+    result = sm.volume_map(bumpy, boundary=boundary)
+    assert result.certificate.certified
+    assert result.distortion.flips == 0
+    R, r = result.torus.R, result.torus.r
+    surface = result.image[bumpy.boundary_vertices]
+    tube = np.hypot(np.hypot(surface[:, 0], surface[:, 1]) - R, surface[:, 2])
+    assert np.allclose(tube, r, rtol=1e-12)
+    for stage in ("frozen", "glide"):
+        energies = [record.energy for record in result.history if record.stage == stage]
+        assert all(b <= a for a, b in pairwise(energies))
+
+
+def test_gliding_improves_on_frozen(bumpy):
+    frozen = sm.volume_map(bumpy, boundary="frozen").distortion
+    glide = sm.volume_map(bumpy, boundary="glide").distortion
+    assert glide.element_mad < frozen.element_mad
+    assert glide.total_distortion < frozen.total_distortion
+
+
+def test_same_input_same_bits(bumpy):
+    a, b = (sm.volume_map(bumpy, max_iter=4).image for _ in range(2))
+    assert np.array_equal(a, b)
+
+
+def test_going_on_from_a_saved_map_lowers_the_distortion_further(bumpy, tmp_path):
+    from stretchmap.maps.files import load_map
+
+    first = sm.volume_map(bumpy, max_iter=12)
+    first.save(tmp_path / "map.npz")
+    loaded = load_map(tmp_path / "map.npz")
+    again = sm.volume_map(loaded.solid, start=loaded.image, torus=loaded.torus)
+    assert again.certificate.certified
+    assert again.distortion.element_mad < first.distortion.element_mad
+    assert {record.stage for record in again.history} == {"glide", "equalise"}
+
+
+def test_a_tangled_start_is_untangled(bumpy):
+    good = sm.volume_map(bumpy, boundary="frozen", max_iter=6)
+    inner = np.setdiff1d(np.arange(bumpy.n_vertices), bumpy.boundary_vertices)
+    start = good.image.copy()
+    start[inner] += 0.15 * good.torus.r * RNG.standard_normal((len(inner), 3))
+    flips = np.count_nonzero(_core.signed_tet_volumes(start, bumpy.T) <= 0.0)
+    assert flips > 10
+    again = sm.volume_map(bumpy, start=start, torus=good.torus, max_iter=2)
+    assert again.certificate.certified
+    assert any(record.stage == "untangle" for record in again.history)
+
+
+def test_ring_volumes_can_be_made_exact(bumpy):
+    plain = sm.volume_map(bumpy, max_iter=20)
+    exact = sm.volume_map(bumpy, max_iter=20, vertex_exact=True)
+    assert exact.vertex_exact and exact.certificate.certified
+    inner = np.setdiff1d(np.arange(bumpy.n_vertices), bumpy.boundary_vertices)
+    assert np.abs(exact.distortion.ring_ratios[inner] - 1.0).max() < 1e-9
+    assert exact.distortion.element_sd <= 1.25 * plain.distortion.element_sd
+    assert np.abs(plain.distortion.ring_ratios[inner] - 1.0).max() > 1e-6
+
+
+def test_refinement_is_reported_or_refused(load_solid):
+    solid = load_solid("kitten_jigsaw_small")
+    with pytest.raises(DegenerateError) as caught:
+        sm.volume_map(solid, refine=False)
+    assert caught.value.ids
+    result = sm.volume_map(solid, max_iter=3)
+    assert result.certificate.certified
+    assert result.refinement is not None and result.refinement.n_split > 0
+    assert np.array_equal(result.solid.V[: solid.n_vertices], solid.V)
+    assert result.to_dict()["added_vertices"] == result.refinement.n_split
+
+
+def test_renumbering_rotating_and_scaling_the_input_changes_nothing(bumpy):
+    reference = sm.volume_map(bumpy, c=0.0, max_iter=5).distortion
+    order = RNG.permutation(bumpy.n_vertices)
+    rank = np.argsort(order).astype(np.int32)
+    Q = np.linalg.qr(RNG.standard_normal((3, 3)))[0]
+    Q *= np.sign(np.linalg.det(Q))
+    moved = TetMesh(37.0 * bumpy.V[order] @ Q.T + 5.0, rank[bumpy.T])
+    other = sm.volume_map(moved, c=0.0, max_iter=5).distortion
+    # The boundary map stops at a tolerance; how far beyond it depends on rounding.
+    assert other.ring_sd == pytest.approx(reference.ring_sd, rel=1e-3)
+    assert other.total_distortion == pytest.approx(reference.total_distortion, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"method": "magic"},
+        {"boundary": "loose"},
+        {"method": "vsem", "boundary": "glide"},
+        {"method": "certified", "c": 1.0},
+        {"c": -1.0},
+        {"c": float("nan")},
+        {"max_iter": -1},
+        {"tol": -1.0},
+        {"start": np.zeros((3, 3))},
+    ],
+)
+def test_bad_options_are_named(bumpy, options):
+    with pytest.raises(OptionError):
+        sm.volume_map(bumpy, **options)
