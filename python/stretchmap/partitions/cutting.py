@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,6 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.torus import TWO_PI, Torus
 from ..mesh.meshes import TetMesh
-
-if TYPE_CHECKING:
-    pass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    pass
 
 _NO_GATE = np.zeros(0)
 
@@ -48,8 +40,49 @@ class Pieces:
         columns = slice(0, 3) if of == "source" else slice(3, 6)
         return _core.tet_volumes(np.ascontiguousarray(self.points[:, columns]), self.T)
 
-    def cut(self, values: NDArray[np.float64], gate: NDArray[np.float64] = _NO_GATE) -> Pieces:
-        split = _core.split_tets(self.T, np.ascontiguousarray(values), np.ascontiguousarray(gate))
+    def only(self, chosen: NDArray[np.bool_]) -> Pieces:
+        """The chosen tets, with the same points."""
+        T = np.ascontiguousarray(self.T[chosen])
+        return Pieces(self.points, T, self.parent[chosen], self.side[chosen])
+
+    def cut(self, axis: str, level: float, *, gated: bool = True) -> Pieces:
+        """All tets cut along one level of a coordinate, ungated its continuation as well."""
+        values, gate = self.level_function(axis, level)
+        return self._split(self.T, values, gate if gated else _NO_GATE)[0]
+
+    def cut_within(
+        self, chosen: NDArray[np.bool_], axis: str, level: float
+    ) -> tuple[Pieces, NDArray[np.intp]]:
+        """The chosen tets cut along a level, and the others only where they have to follow.
+
+        At vertices of no chosen tet the function is taken to vanish, so that another tet is cut at
+        edges between two vertices of chosen ones and nowhere else: neighbours agree on every edge.
+
+        Returns
+        -------
+        Pieces
+        ndarray, shape (k',)
+            The tet here that each tet there was cut from.
+        """
+        values, gate = self.level_function(axis, level)
+        inner = np.zeros(len(values), bool)
+        inner[self.T[chosen]] = True
+        values = np.where(inner, values, 0.0)
+        touched = np.flatnonzero(inner[self.T].sum(axis=1) > 1)
+        untouched = np.setdiff1d(np.arange(len(self.T)), touched, assume_unique=True)
+        split, parent = self._split(np.ascontiguousarray(self.T[touched]), values, gate)
+        origin = np.concatenate([untouched, touched[parent]])
+        return Pieces(
+            points=split.points,
+            T=np.concatenate([self.T[untouched], split.T]),
+            parent=self.parent[origin],
+            side=np.concatenate([self.side[untouched], split.side]),
+        ), origin
+
+    def _split(
+        self, T: NDArray[np.int32], values: NDArray[np.float64], gate: NDArray[np.float64]
+    ) -> tuple[Pieces, NDArray[np.int32]]:
+        split = _core.split_tets(T, np.ascontiguousarray(values), np.ascontiguousarray(gate))
         first, second = (self.points[split.cut_edges[:, k]] for k in (0, 1))
         added = first + split.cut_weight[:, None] * (second - first)
         return Pieces(
@@ -57,36 +90,46 @@ class Pieces:
             T=split.tets,
             parent=self.parent[split.parent],
             side=split.side,
-        )
+        ), split.parent
 
-    def sheet(self, axis: str, angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Function that vanishes on the sheet at an angle and on its continuation, and its gate."""
-        a, b = self.points[:, [3, 4] if axis == "u" else [6, 5]].T
-        c, s = math.cos(angle), math.sin(angle)
-        return b * c - a * s, a * c + b * s
+    def level_function(
+        self, axis: str, level: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Function that vanishes on a level, and the gate that is positive where to cut.
+
+        For angles it vanishes on the continuation of the sheet, too: that of ``u`` lies across the
+        hole and is gated off, that of ``v`` is cut, since all sheets meet in the core.
+        """
+        if axis == "s":
+            return self.points[:, 7] - level, _NO_GATE
+        a, b = self.angle_pair(axis)
+        c, s = math.cos(level), math.sin(level)
+        return b * c - a * s, a * c + b * s if axis == "u" else _NO_GATE
+
+    def angle_pair(self, axis: str) -> NDArray[np.float64]:
+        """Cosine and sine of ``u`` or ``v``, each times a length, (2, n)."""
+        return self.points[:, [3, 4] if axis == "u" else [6, 5]].T
+
+    def parts_along(self, axis: str, cuts: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Part of each tet between levels along which all are cut already."""
+        # The function is linear on a piece and has one sign in it, so its centroid tells the part.
+        if axis == "s":
+            return np.searchsorted(cuts, self.points[self.T, 7].mean(axis=1))
+        a, b = (values[self.T].mean(axis=1) for values in self.angle_pair(axis))
+        turned = (np.arctan2(b, a) - cuts[0]) % TWO_PI
+        return np.searchsorted(cuts[1:] - cuts[0], turned)
 
 
 def cut_all(
     pieces: Pieces, axes: tuple[str, ...], levels: list[NDArray[np.float64]]
 ) -> tuple[Pieces, NDArray[np.int32]]:
-    """Cut along every level; the pieces and the part of each."""
+    """Cut the whole along every level; the pieces and the part of each."""
     for axis, cuts in zip(axes, levels, strict=True):
         for level in cuts:
-            if axis == "s":
-                pieces = pieces.cut(pieces.points[:, 7] - level)
-            else:
-                sheet, gate = pieces.sheet(axis, level)
-                pieces = pieces.cut(sheet, gate if axis == "u" else _NO_GATE)
-    # Every function is linear on a piece and has one sign in it, so its centroid tells the part.
-    centre = 0.25 * sum(pieces.points[corner] for corner in pieces.T.T)
+            pieces = pieces.cut(axis, level)
     labels = np.zeros(len(pieces.T), np.intp)
     for axis, cuts in zip(axes, levels, strict=True):
-        if axis == "s":
-            labels = labels * (len(cuts) + 1) + np.searchsorted(cuts, centre[:, 7])
-            continue
-        a, b = centre[:, [3, 4] if axis == "u" else [6, 5]].T
-        turned = (np.arctan2(b, a) - cuts[0]) % TWO_PI
-        labels = labels * len(cuts) + np.searchsorted(cuts[1:] - cuts[0], turned)
+        labels = labels * (len(cuts) + (axis == "s")) + pieces.parts_along(axis, cuts)
     return pieces, labels.astype(np.int32)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,6 @@ from scipy.optimize import brentq
 from .. import _core
 from ..base.torus import TWO_PI
 from ..errors import OptionError, SolverError
-
-if TYPE_CHECKING:
-    pass
 from .cutting import Pieces
 
 
@@ -55,14 +51,14 @@ def levels_of(
 
 def _sector_volume(pieces: Pieces, axis: str, start: float, of: str) -> Callable[[float], float]:
     """Volume from the angle ``start`` up to another."""
-    halves = pieces.cut(pieces.sheet(axis, start)[0])
+    halves = pieces.cut(axis, start, gated=False)
     volumes = halves.volumes(of)
     ahead = halves.side > 0
     parts = [(np.ascontiguousarray(halves.T[m]), volumes[m]) for m in (ahead, ~ahead)]
     first = float(parts[0][1].sum())
 
     def below(angle: float) -> float:
-        values = np.ascontiguousarray(halves.sheet(axis, angle)[0])
+        values = np.ascontiguousarray(halves.level_function(axis, angle)[0])
         if angle - start <= math.pi:
             return _core.volume_below(*parts[0], values)
         return first + _core.volume_below(*parts[1], values)
@@ -77,3 +73,34 @@ def _root(below: Callable[[float], float], target: float, ends: tuple[float, flo
     if not excess(ends[0]) <= 0.0 <= excess(ends[1]):
         raise SolverError("no level divides the image as asked; is the map certified?")
     return float(brentq(excess, *ends, xtol=1e-15, rtol=4 * np.finfo(float).eps))
+
+
+def cut_nested(
+    pieces: Pieces, axes: tuple[str, ...], shares: list[NDArray[np.float64]], start: float
+) -> tuple[Pieces, NDArray[np.int32], tuple[NDArray[np.float64], ...]]:
+    """Cut along each coordinate at levels of their own within each part of those before it.
+
+    Returns
+    -------
+    Pieces
+    labels : ndarray of int32, shape (k,)
+    levels : tuple of ndarray
+        For the i-th coordinate shape (p_1, ..., p_{i-1}, cuts).
+    """
+    labels = np.zeros(len(pieces.T), np.intp)
+    levels: list[NDArray[np.float64]] = []
+    for i, (axis, share) in enumerate(zip(axes, shares, strict=True)):
+        before = [len(entry) for entry in shares[:i]]
+        cuts = []
+        for cell in range(math.prod(before)):
+            cuts.append(levels_of(pieces.only(labels == cell), axis, share, start, "source"))
+            for level in cuts[-1]:
+                pieces, origin = pieces.cut_within(labels == cell, axis, level)
+                labels = labels[origin]
+        parts = np.zeros(len(labels), np.intp)
+        for cell, levels_here in enumerate(cuts):
+            inside = labels == cell
+            parts[inside] = pieces.only(inside).parts_along(axis, levels_here)
+        labels = labels * len(share) + parts
+        levels.append(np.array(cuts).reshape(*before, -1))
+    return pieces, labels.astype(np.int32), tuple(levels)

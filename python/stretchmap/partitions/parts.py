@@ -12,7 +12,8 @@ they cross. On a tet the level function is linear:
 The levels that divide the *image* as asked are found first. What the parts of the source then lack
 or have too much is the volume distortion of the map, reported as the uncorrected errors; they
 correspond to Table 7.1. One-dimensional root finding then moves each level until the source is
-divided as asked.
+divided as asked: those of the first coordinate divide the whole, those of the second each part of
+the first by itself, and so on, so that every cell of a grid has the volume asked for.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ from ..base.arrays import read_only
 from ..base.tables import plain, table
 from ..errors import ArrayError, OptionError
 from ..mesh.meshes import TetMesh, TriMesh
+from .cutting import Pieces, cut_all, part_volumes
+from .levels import cut_nested, levels_of, shares_of
 
 if TYPE_CHECKING:
     from ..maps.result import MapResult
-from .cutting import Pieces, cut_all, part_volumes
-from .levels import levels_of, shares_of
 
 __all__ = ["Partition", "partition"]
 
@@ -60,9 +61,10 @@ class Partition:
         Tet of the source each tet was cut from.
     levels : tuple of ndarray
         Per coordinate the levels of the cuts: angles in radians from ``start`` on, or values of
-        ``(s / r)^2``.
+        ``(s / r)^2``. Corrected levels of the second coordinate differ between the parts of the
+        first: shape (parts, cuts), and so on.
     uncorrected_levels : tuple of ndarray
-        The levels that divide the image exactly.
+        The levels that divide the image along each coordinate exactly, one array each.
     volumes : ndarray, shape (p,)
     errors : ndarray, shape (p,)
         ``volume / (fraction total) - 1``.
@@ -185,12 +187,12 @@ def partition(
         one entry each.
     by : {"s", "u", "v"} or tuple of them
         Nested shells, sectors the long way round, sectors around the tube. Several make a grid; its
-        parts are numbered with the last coordinate running fastest. Only the shares along each
-        coordinate are then corrected, those of the cells keep the distortion of the map.
+        parts are numbered with the last coordinate running fastest.
     start : float
         Angle in radians at which the first sector of ``u`` or ``v`` begins.
     correct : bool
-        Move the levels until the source is divided exactly. False: cut at the uncorrected levels.
+        Move the levels until every part, and every cell of a grid, has exactly its share of the
+        source's volume (up to rounding, about 1e-13). False: cut at the uncorrected levels.
 
     Returns
     -------
@@ -223,13 +225,11 @@ def partition(
     uncorrected = [
         levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)
     ]
-    levels = uncorrected
+    cut, labels = cut_all(pieces, axes, uncorrected)
+    raw = part_volumes(cut, labels, shares)
+    levels = tuple(uncorrected)
     if correct:
-        levels = [
-            levels_of(pieces, a, p, start, "source") for a, p in zip(axes, shares, strict=True)
-        ]
-    raw = part_volumes(*cut_all(pieces, axes, uncorrected), shares)
-    cut, labels = cut_all(pieces, axes, levels)
+        cut, labels, levels = cut_nested(pieces, axes, shares, start)
     solid = TetMesh(cut.points[:, :3], cut.T)
     asked = np.ones(1)
     for share in shares:
@@ -244,7 +244,7 @@ def partition(
         image=read_only(np.ascontiguousarray(cut.points[:, 3:6])),
         labels=read_only(labels),
         parent_tet=read_only(cut.parent),
-        levels=tuple(levels),
+        levels=levels,
         uncorrected_levels=tuple(uncorrected),
         volumes=read_only(volumes),
         errors=read_only(volumes / (asked * total) - 1.0),

@@ -104,14 +104,30 @@ def test_sectors_around_the_tube_follow_the_closed_form(standard):
     assert np.allclose(share, [1 / 3, 2 / 3], atol=2e-3)
 
 
-def test_grid_of_cells(bumpy_map):
-    parts = partition(bumpy_map, (3, [0.5, 0.5], 2), ("u", "s", "v"))
+@pytest.mark.parametrize(
+    ("fractions", "by"),
+    [
+        ((3, [0.5, 0.5], 2), ("u", "s", "v")),
+        ((2, 3), ("s", "v")),
+        ((4, [0.2, 0.5, 0.3]), ("v", "u")),
+    ],
+)
+def test_every_cell_of_a_grid_has_its_volume(bumpy_map, fractions, by):
+    parts = partition(bumpy_map, fractions, by)
     check(bumpy_map, parts)
-    cells = parts.volumes.reshape(3, 2, 2) / bumpy_map.solid.volume
-    assert np.allclose(cells.sum(axis=(1, 2)), 1 / 3, rtol=1e-11)
-    assert np.allclose(cells.sum(axis=(0, 2)), 1 / 2, rtol=1e-11)
-    assert np.allclose(cells.sum(axis=(0, 1)), 1 / 2, rtol=1e-11)
-    assert np.abs(parts.errors).max() < 0.1
+    assert np.abs(parts.errors).max() < 1e-12 < np.abs(parts.uncorrected_errors).max()
+    assert np.abs(parts.uncorrected_errors).max() < 0.2
+    counts = [len(f) if isinstance(f, list) else f for f in fractions]
+    for i, (axis, levels) in enumerate(zip(by, parts.levels, strict=True)):
+        assert levels.shape == (*counts[:i], counts[i] - (axis == "s"))
+
+
+def test_uncorrected_cells_are_those_of_the_image(bumpy_map):
+    raw = partition(bumpy_map, (3, 2), ("u", "s"), correct=False)
+    assert np.array_equal(raw.errors, raw.uncorrected_errors)
+    assert np.array_equal(
+        raw.uncorrected_errors, partition(bumpy_map, (3, 2), ("u", "s")).uncorrected_errors
+    )
 
 
 def test_cutting_one_tet_gives_the_share_of_the_formula():
