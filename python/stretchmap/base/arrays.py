@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -40,9 +41,9 @@ def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
     """
     raw = _as_array(points, name)
     if raw.dtype.kind not in "fiu":
-        raise ArrayError(f"{name} must hold real numbers, not {raw.dtype}")
+        raise ArrayError(f"{name} must hold real numbers, not {_kind(raw)}")
     _check_shape(raw, name, 3, "points")
-    copy = np.array(raw, dtype=np.float64, order="C")
+    copy = np.array(_as_doubles(raw, name), dtype=np.float64, order="C")
     if len(copy) > INT32_MAX:
         raise ArrayError(f"{name} has {len(copy)} rows; at most {INT32_MAX} can be indexed")
     bad = np.flatnonzero(~np.isfinite(copy).all(axis=1))
@@ -83,7 +84,7 @@ def as_indices(indices: ArrayLike, width: int, n: int, name: str = "F") -> NDArr
     raw = _as_array(indices, name)
     if raw.dtype.kind not in "iu":
         hint = f"; convert with {name}.astype(int)" if raw.dtype.kind == "f" else ""
-        raise ArrayError(f"{name} must hold integers, not {raw.dtype}{hint}")
+        raise ArrayError(f"{name} must hold integers, not {_kind(raw)}{hint}")
     element = {3: "face", 4: "tet"}[width]
     _check_shape(raw, name, width, f"{element}s")
     if len(raw) > INT32_MAX // (2 * width):
@@ -98,6 +99,92 @@ def as_indices(indices: ArrayLike, width: int, n: int, name: str = "F") -> NDArr
             bad,
         )
     return read_only(np.array(raw, dtype=np.int32, order="C"))
+
+
+def as_reals(
+    values: ArrayLike, name: str, shape: tuple[int | None, ...], *, finite: bool = True
+) -> NDArray[np.float64]:
+    """Convert real numbers to a C-ordered array of doubles.
+
+    Parameters
+    ----------
+    values : array_like of real numbers
+        Anything else is refused: masked entries, complex numbers, truth values, text, objects.
+    name : str
+        What the caller names the array, for messages.
+    shape : tuple of int or None
+        Length of each axis; None where any will do.
+    finite : bool
+        Refuse NaN and infinities.
+
+    Returns
+    -------
+    ndarray of float64
+        The input itself where it is of that kind already.
+
+    Raises
+    ------
+    ArrayError
+        Another shape or no real numbers.
+    NonFiniteError
+        A NaN or an infinity; ``ids`` are the rows.
+    """
+    raw = _as_array(values, name)
+    if raw.dtype.kind not in "fiu":
+        raise ArrayError(f"{name} must hold real numbers, not {_kind(raw)}")
+    _check_axes(raw, name, shape)
+    reals = _as_doubles(raw, name)
+    if finite and not np.isfinite(reals).all():
+        bad = _rows(~np.isfinite(reals))
+        raise NonFiniteError(f"{name} has NaN or infinite values in {describe('row', bad)}", bad)
+    return reals
+
+
+def as_integers(
+    values: ArrayLike,
+    name: str,
+    shape: tuple[int | None, ...],
+    low: int = -INT32_MAX,
+    high: int = INT32_MAX,
+) -> NDArray[np.int64]:
+    """Convert integers of a range to an array of 64-bit ones.
+
+    Parameters
+    ----------
+    values : array_like of integers
+        Any integer type; floating-point numbers are refused even if they are whole.
+    name : str
+        What the caller names the array, for messages.
+    shape : tuple of int or None
+        Length of each axis; None where any will do.
+    low, high : int
+        The range, both ends in it.
+
+    Returns
+    -------
+    ndarray of int64
+
+    Raises
+    ------
+    ArrayError
+        Another shape or no integers.
+    IndexRangeError
+        A number out of range; ``ids`` are the rows.
+    """
+    raw = _as_array(values, name)
+    if raw.dtype.kind not in "iu":
+        hint = f"; convert with {name}.astype(int)" if raw.dtype.kind == "f" and raw.size else ""
+        raise ArrayError(f"{name} must hold integers, not {_kind(raw)}{hint}")
+    _check_axes(raw, name, shape)
+    outside = (raw < low) | (raw > high)
+    if outside.any():
+        bad = _rows(outside)
+        raise IndexRangeError(
+            f"{name} must lie between {low} and {high}, {describe('row', bad)} does not: "
+            f"{raw[bad[0]].tolist()}",
+            bad,
+        )
+    return raw.astype(np.int64)
 
 
 def describe(what: str, ids: ArrayLike, limit: int = 5) -> str:
@@ -115,10 +202,40 @@ def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
     if np.ma.is_masked(values):
         raise ArrayError(f"{name} is a masked array with masked entries; fill or drop them")
     try:
-        raw = np.asarray(values)
-    except (ValueError, TypeError, OverflowError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # ragged lists are objects with a warning in some NumPy
+            return np.asarray(values)
+    except Exception as error:  # whatever an object's own conversion raises
         raise ArrayError(f"{name} is not a rectangular array of numbers: {error}") from error
-    return raw
+
+
+def _as_doubles(raw: NDArray[Any], name: str) -> NDArray[np.float64]:
+    with np.errstate(over="ignore"):
+        doubles = np.ascontiguousarray(raw, np.float64)
+    if raw.dtype.itemsize > 8 and (np.isinf(doubles) & np.isfinite(raw)).any():
+        raise NonFiniteError(f"{name} has values beyond double precision; scale them")
+    return doubles
+
+
+def _kind(raw: NDArray[Any]) -> str:
+    """What an array holds, in words, where NumPy's name for it says little."""
+    words = {"b": "truth values", "O": "Python objects", "U": "text", "S": "bytes", "c": "complex"}
+    return words.get(raw.dtype.kind, str(raw.dtype))
+
+
+def _check_axes(raw: NDArray[Any], name: str, shape: tuple[int | None, ...]) -> None:
+    if raw.ndim == len(shape) and all(
+        want in (None, have) for want, have in zip(shape, raw.shape, strict=True)
+    ):
+        return
+    words = ["any" if n is None else str(n) for n in shape]
+    expected = f"({', '.join(words)}{',' if len(words) == 1 else ''})"
+    raise ArrayError(f"{name} must have shape {expected}, not {raw.shape}")
+
+
+def _rows(where: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Rows (of a number itself: row 0) with a marked entry."""
+    return np.flatnonzero(np.atleast_1d(where).reshape(len(np.atleast_1d(where)), -1).any(axis=1))
 
 
 def _check_shape(raw: NDArray[Any], name: str, width: int, what: str) -> None:

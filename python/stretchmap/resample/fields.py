@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from ..errors import ArrayError, OptionError
+from ..base.arrays import as_reals
+from ..errors import DegenerateError, OptionError
 
 if TYPE_CHECKING:
     from ..maps.files import LoadedMap
@@ -24,65 +25,106 @@ def transfer(
     conserve: str = "integral",
     per: str = "vertex",
 ) -> NDArray[np.float64]:
-    """Carry a scalar field from the source to the target of a registration.
+    """Carry a field from the source to the target of a registration.
 
     Every target tet gets the mean of the field over it, by a four-point rule of the pulled-back
     field; a point in the thin space between the image's and the target's boundary takes the value
-    of the nearest image vertex. The rule does not see the kinks of the field, so that the sum comes
-    out right only nearly; one factor for all tets then makes it exact.
+    of the nearest image vertex. What then misses of the integral is added tet by tet, in
+    proportion to the room between the mean and the extreme values the rule met in that tet: most
+    where the field is steep, nothing where it is constant. Only what does not fit into that room
+    (the map does not preserve volume where the field is large) is added in proportion to the
+    distance from the extreme values of the whole field. So the result stays within the range of
+    the field, whatever its sign and however small its mean, and a constant stays one.
 
     Parameters
     ----------
     registration : Registration or LoadedMap
-    values : array_like, shape (n,) or (k,)
-        At the vertices of ``registration.solid`` or in its tets, see ``per``.
+    values : array_like, shape (n,) or (k,), or (n, c) or (k, c)
+        At the vertices of ``registration.solid`` or in its tets, see ``per``. The columns of a
+        vector field are carried one by one; their directions are not turned.
     conserve : {"integral", "mean"}
-        What agrees exactly: the integral over the solid (for a density), or its mean. They differ
-        if the volumes do.
+        What agrees, to rounding: the integral over the solid (for a density), or its mean. They
+        differ, by a factor common to all tets, if the volumes do.
     per : {"vertex", "tet"}
 
     Returns
     -------
-    ndarray, shape (target.n_tets,)
+    ndarray, shape (target.n_tets,) or (target.n_tets, c)
 
     Raises
     ------
     ArrayError
-        If ``values`` has the wrong shape.
+        If ``values`` has the wrong shape or holds no real numbers.
+    NonFiniteError
+        If ``values`` holds a NaN or an infinity; ``ids`` are the rows.
     OptionError
-        If an option is unknown, the map is no registration, or the sum is zero while the carried
-        field's is not, so that no factor exists.
+        If an option is unknown or the map is no registration.
+    DegenerateError
+        If a tet of source or target has no positive volume; ``ids`` are the tets.
     """
     solid, target = registration.solid, getattr(registration, "target", None)
     if solid is None or target is None:
         raise OptionError("a field is carried by a registration; this map has no target solid")
     if conserve not in ("integral", "mean") or per not in ("vertex", "tet"):
         raise OptionError(f"conserve is integral or mean, per is vertex or tet: {conserve}, {per}")
-    field = np.asarray(values, float)
+    for mesh, name in ((solid, "source"), (target, "target")):
+        flat = np.flatnonzero(~(mesh.tet_volumes > 0.0))
+        if len(flat):
+            raise DegenerateError(f"{len(flat)} tets of the {name} have no positive volume", flat)
     count = solid.n_vertices if per == "vertex" else solid.n_tets
-    if field.shape != (count,):
-        raise ArrayError(f"values must have shape ({count},), got {field.shape}")
+    field = as_reals(values, "values", (count, None) if np.ndim(values) == 2 else (count,))
+    columns = field.reshape(count, -1)
+    # A power of two, so that no sum overflows and nothing is rounded.
+    unit = np.ldexp(1.0, np.frexp(np.abs(columns).max(initial=0.0))[1] - 1)
+    columns = columns / unit
+    samples = _samples(registration, columns, per)
+    means = np.clip(samples.mean(axis=1), samples.min(axis=1), samples.max(axis=1))
+    per_tet = columns[solid.T].mean(axis=1) if per == "vertex" else columns
+    wanted = solid.tet_volumes @ per_tet / solid.volume
+    bounds = columns.min(axis=0), columns.max(axis=0)
+    for low, high in ((samples.min(axis=1), samples.max(axis=1)), bounds):
+        means = _shifted(means, target.tet_volumes, wanted, low, high)
+    if conserve == "integral":
+        means *= solid.volume / target.volume
+    return np.reshape(means * unit, (target.n_tets, *field.shape[1:]))
+
+
+def _samples(
+    registration: Registration | LoadedMap, columns: NDArray[np.float64], per: str
+) -> NDArray[np.float64]:
+    """(k, 4, c) The pulled-back field at the points of a rule of degree two in the target tets."""
+    solid, target = registration.solid, registration.target
     weight = (5.0 - np.sqrt(5.0)) / 20.0
     rule = np.full((4, 4), weight) + (1.0 - 4.0 * weight) * np.eye(4)
-    samples = np.einsum("qc,tcx->tqx", rule, target.V[target.T]).reshape(-1, 3)
-    found = registration.point_map.inverse(samples)
+    points = np.einsum("qc,tcx->tqx", rule, target.V[target.T]).reshape(-1, 3)
+    found = registration.point_map.inverse(points)
     if per == "vertex":
-        carried = found.interpolate(solid.T, field)
-        sites, at_sites = registration.image, field
-        total = float((solid.tet_volumes * field[solid.T].mean(axis=1)).sum())
+        carried = found.interpolate(solid.T, columns)
+        corners = columns[solid.T[found.tets]]  # weights sum to one but for rounding
+        carried = np.clip(carried, corners.min(axis=1), corners.max(axis=1))
+        sites = registration.image
     else:
-        carried = field[found.tets]
-        sites, at_sites = registration.image[solid.T].mean(axis=1), field
-        total = float((solid.tet_volumes * field).sum())
+        carried = columns[found.tets]
+        sites = registration.image[solid.T].mean(axis=1)
     outside = ~found.inside
     if outside.any():
-        carried[outside] = at_sites[cKDTree(sites).query(samples[outside])[1]]
-    means = carried.reshape(-1, 4).mean(axis=1)
-    if conserve == "mean":
-        total *= target.volume / solid.volume
-    have = float((target.tet_volumes * means).sum())
-    if have == total:
-        return means
-    if have == 0.0 or total == 0.0:
-        raise OptionError("the field sums to zero: no factor conserves its sum; add a constant")
-    return means * (total / have)
+        carried[outside] = columns[cKDTree(sites).query(points[outside])[1]]
+    return carried.reshape(target.n_tets, 4, -1)
+
+
+def _shifted(
+    means: NDArray[np.float64],
+    volumes: NDArray[np.float64],
+    wanted: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The means moved towards a bound, all by the same share, until theirs is as wanted.
+
+    At most up to the bound: what is then still missing is left.
+    """
+    missing = volumes.sum() * wanted - volumes @ means
+    room = np.where(missing > 0.0, high - means, low - means)
+    most = volumes @ room
+    share = np.divide(missing, most, out=np.zeros_like(missing), where=most != 0.0)
+    return means + np.clip(share, 0.0, 1.0) * room
