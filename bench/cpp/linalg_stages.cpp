@@ -5,7 +5,7 @@
 #include "stretchmap/linalg/spd_solver.hpp"
 #include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
-#include "stretchmap/stretch/tet_laplacian.hpp"
+#include "stretchmap/volume/tet_laplacian.hpp"
 
 namespace stretchmap::bench {
 namespace {
@@ -20,11 +20,12 @@ System harmonic_system(const SolidTorus& solid) {
   const Index n = static_cast<Index>(solid.points.rows());
   Flags fixed = Flags::Zero(n);
   Points x = Points::Zero(n, 3);
-  for (const Index i : tet_boundary(solid.tets, n).vertices) {
+  for (const Index i : mesh::tet_boundary(solid.tets, n).vertices) {
     fixed[i] = 1;
     x.row(i) = solid.standard.row(i);
   }
-  TetLaplacian laplacian(solid.tets, fixed, signed_tet_volumes(solid.points, solid.tets));
+  volume::TetLaplacian laplacian(solid.tets, fixed,
+                                 volume::signed_tet_volumes(solid.points, solid.tets));
   System system{laplacian.pattern(), {}};
   Points rhs;
   laplacian.assemble(solid.points, 0.0, x, system.matrix, rhs);
@@ -36,16 +37,19 @@ void backend_stage(const std::string& backend, const System& system, const Solid
                    const Settings& settings, const Report& report) {
   const std::string name = "linalg." + backend + ".";
   const double rows = static_cast<double>(system.matrix.rows());
-  std::unique_ptr<SpdSolver> solver;
+  std::unique_ptr<linalg::SpdSolver> solver;
   Record row = measure(
       row_name(name + "setup", solid, settings),
-      [&] { solver = std::make_unique<SpdSolver>(system.matrix, SpdOptions{backend}); }, 0.3, 5);
+      [&] {
+        solver = std::make_unique<linalg::SpdSolver>(system.matrix, linalg::SpdOptions{backend});
+      },
+      0.3, 5);
   row.counters = {{"rows", rows}, {"entries", double(system.matrix.nonZeros())}};
   report(row);
   row = measure(row_name(name + "refactor", solid, settings), [&] { solver->refactor(); });
   report(row);
   for (const double tol : {1e-6, 1e-10}) {
-    SolveReport solved;
+    linalg::SolveReport solved;
     Rows x;
     row = measure(row_name(name + (tol == 1e-6 ? "solve_1e-6" : "solve_1e-10"), solid, settings),
                   [&] {

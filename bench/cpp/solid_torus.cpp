@@ -97,10 +97,11 @@ SolidTorus solid_torus(Index n_tets) {
     for (Index f = 0; f < d.faces.rows(); ++f)
       add_prism({d.faces(f, 0), d.faces(f, 1), d.faces(f, 2)}, i * size, (i + 1) % m * size, s.tets,
                 t);
-  const Vec volumes = tet_volumes(s.points, s.tets);
+  const Vec volumes = mesh::tet_volumes(s.points, s.tets);
   for (Index k = 0; k < s.tets.rows(); ++k)
     if (volumes[k] < 0.0) std::swap(s.tets(k, 2), s.tets(k, 3));
-  const double scale = std::cbrt(volumes.cwiseAbs().sum() / tet_volumes(s.standard, s.tets).sum());
+  const double scale =
+      std::cbrt(volumes.cwiseAbs().sum() / mesh::tet_volumes(s.standard, s.tets).sum());
   s.standard *= scale;
   s.R *= scale;
   s.r *= scale;

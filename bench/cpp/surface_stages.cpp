@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "stages.hpp"
+#include "stretchmap/area/surface_sem.hpp"
 #include "stretchmap/forms/cotangent.hpp"
 #include "stretchmap/forms/harmonic.hpp"
 #include "stretchmap/forms/hodge.hpp"
@@ -11,20 +12,19 @@
 #include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
-#include "stretchmap/stretch/surface_sem.hpp"
 
 namespace stretchmap::bench {
 namespace {
 
 struct Surface {
-  TetBoundary boundary;
+  mesh::TetBoundary boundary;
   Points points;
   Points2 turns;
-  SurfaceTopology topology;
+  mesh::SurfaceTopology topology;
 };
 
 // How often a loop runs along u and along v.
-Eigen::Vector2d windings(const Loop& loop, const Points2& turns) {
+Eigen::Vector2d windings(const homology::Loop& loop, const Points2& turns) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (std::size_t k = 0; k < loop.size(); ++k) {
     Eigen::RowVector2d step = turns.row(loop[(k + 1) % loop.size()]) - turns.row(loop[k]);
@@ -37,13 +37,15 @@ void mesh_stages(const SolidTorus& solid, const Settings& settings, const Report
                  Surface& s) {
   const auto name = [&](const char* stage) { return row_name(stage, solid, settings); };
   const Index n = static_cast<Index>(solid.points.rows());
-  Record row = measure(name("mesh.boundary"), [&] { s.boundary = tet_boundary(solid.tets, n); });
+  Record row =
+      measure(name("mesh.boundary"), [&] { s.boundary = mesh::tet_boundary(solid.tets, n); });
   row.counters = {{"faces", s.boundary.faces.rows()}};
   report(row);
 
-  SolidDiagnosis diagnosis;
+  mesh::SolidDiagnosis diagnosis;
   row = measure(
-      name("mesh.diagnose"), [&] { diagnosis = diagnose_solid(solid.points, solid.tets); }, 0.3, 5);
+      name("mesh.diagnose"), [&] { diagnosis = mesh::diagnose_solid(solid.points, solid.tets); },
+      0.3, 5);
   row.counters = {
       {"tets", solid.tets.rows()},
       {"defects", diagnosis.degenerate.size() + diagnosis.misoriented.size() +
@@ -58,8 +60,8 @@ void mesh_stages(const SolidTorus& solid, const Settings& settings, const Report
     s.points.row(i) = solid.points.row(s.boundary.vertices[i]);
     s.turns.row(i) = solid.turns.row(s.boundary.vertices[i]);
   }
-  row =
-      measure(name("mesh.topology"), [&] { s.topology = surface_topology(s.boundary.faces, nb); });
+  row = measure(name("mesh.topology"),
+                [&] { s.topology = mesh::surface_topology(s.boundary.faces, nb); });
   row.counters = {{"euler", double(nb) - s.topology.edges.rows() + s.boundary.faces.rows()}};
   report(row);
 }
@@ -72,24 +74,26 @@ void surface_stages(const SolidTorus& solid, const Settings& settings, const Rep
   mesh_stages(solid, settings, report, s);
   if (!wanted(settings, "surface")) return;
 
-  const Vec lengths = edge_lengths(s.topology, s.points);
-  HomologyGenerators generators;
-  Record row =
-      measure(name("homology.generators"), [&] { generators = tree_cotree(s.topology, lengths); });
+  const Vec lengths = mesh::edge_lengths(s.topology, s.points);
+  homology::HomologyGenerators generators;
+  Record row = measure(name("homology.generators"),
+                       [&] { generators = homology::tree_cotree(s.topology, lengths); });
   row.counters = {{"loops", generators.loops.size()}};
   report(row);
 
-  LinkingMatrix linking;
-  row = measure(name("homology.linking"),
-                [&] { linking = linking_matrix(s.topology, s.points, generators.loops); });
+  homology::LinkingMatrix linking;
+  row = measure(name("homology.linking"), [&] {
+    linking = homology::linking_matrix(s.topology, s.points, generators.loops);
+  });
   row.counters = {{"intersection", std::abs(double(linking(0, 1) - linking(1, 0)))}};
   report(row);
 
-  Loop loop;
+  homology::Loop loop;
   IndexVec target(2);
   target << 1, 0;
   row = measure(name("homology.shortest_loop"), [&] {
-    loop = shortest_loop(s.topology, lengths, generators.forms, target, generators.loops[1]);
+    loop =
+        homology::shortest_loop(s.topology, lengths, generators.forms, target, generators.loops[1]);
   });
   row.counters = {{"vertices", loop.size()}};
   report(row);
@@ -98,13 +102,13 @@ void surface_stages(const SolidTorus& solid, const Settings& settings, const Rep
   Eigen::Matrix2d change;
   for (int k = 0; k < 2; ++k) change.col(k) = windings(generators.loops[k], s.turns);
   const IndexRows forms = change.cast<Index>() * generators.forms;
-  HarmonicSolution harmonic;
+  forms::HarmonicSolution harmonic;
   Vec areas;
   row = measure(name("forms.conformal"), [&] {
-    const Vec weights = cotangent_weights(s.topology, s.points);
+    const Vec weights = forms::cotangent_weights(s.topology, s.points);
     const Index nb = static_cast<Index>(s.points.rows());
-    harmonic = harmonic_forms(nb, s.topology.edges, weights, forms.cast<double>());
-    areas = chart_areas(s.topology, harmonic.forms.row(0), harmonic.forms.row(1));
+    harmonic = forms::harmonic_forms(nb, s.topology.edges, weights, forms.cast<double>());
+    areas = forms::chart_areas(s.topology, harmonic.forms.row(0), harmonic.forms.row(1));
   });
   row.counters = {{"conformal_energy", std::sqrt(harmonic.gram.determinant()) - 1.0},
                   {"flips", (areas.array() <= 0.0).count()},
@@ -112,12 +116,12 @@ void surface_stages(const SolidTorus& solid, const Settings& settings, const Rep
   report(row);
 
   const double aspect = std::sqrt(harmonic.gram(1, 1) / harmonic.gram(0, 0));
-  const Vec face_area = face_areas(s.points, s.boundary.faces);
-  const SurfaceChart chart = surface_chart(s.topology, forms);
-  SurfaceFigures figures;
+  const Vec face_area = mesh::face_areas(s.points, s.boundary.faces);
+  const area::SurfaceChart chart = area::surface_chart(s.topology, forms);
+  area::SurfaceFigures figures;
   constexpr int kSteps = 10;
   row = measure(name("area.sem"), [&] {
-    SurfaceSem sem(chart, face_area, aspect, Points2(harmonic.potentials));
+    area::SurfaceSem sem(chart, face_area, aspect, Points2(harmonic.potentials));
     for (int step = 0; step < kSteps; ++step) sem.step();
     figures = sem.figures();
   });

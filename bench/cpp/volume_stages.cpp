@@ -3,12 +3,12 @@
 #include <memory>
 
 #include "stages.hpp"
-#include "stretchmap/distortion/element_measures.hpp"
+#include "stretchmap/measures/element_measures.hpp"
 #include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
-#include "stretchmap/stretch/rest_shape.hpp"
-#include "stretchmap/stretch/solid_newton.hpp"
-#include "stretchmap/stretch/volumetric_stretch.hpp"
+#include "stretchmap/volume/rest_shape.hpp"
+#include "stretchmap/volume/solid_newton.hpp"
+#include "stretchmap/volume/volumetric_stretch.hpp"
 
 namespace stretchmap::bench {
 namespace {
@@ -24,13 +24,13 @@ struct Problem {
 Problem make_problem(const SolidTorus& solid) {
   Problem p;
   const Index n = static_cast<Index>(solid.points.rows());
-  p.rest = signed_tet_volumes(solid.points, solid.tets);
+  p.rest = volume::signed_tet_volumes(solid.points, solid.tets);
   const double scale = 1.0 / std::cbrt(p.rest.sum());
   p.rest /= p.rest.sum();
   p.V = solid.points * scale;
   p.x = Points::Zero(n, 3);
   p.fixed = Flags::Zero(n);
-  const TetBoundary boundary = tet_boundary(solid.tets, n);
+  const mesh::TetBoundary boundary = mesh::tet_boundary(solid.tets, n);
   for (const Index i : boundary.vertices) {
     p.fixed[i] = 1;
     p.x.row(i) = scale * solid.standard.row(i);
@@ -46,8 +46,8 @@ struct Quality {
 };
 
 Quality quality(const Points& x, const Tets& tets, const Vec& rest) {
-  const Vec volumes = signed_tet_volumes(x, tets);
-  return {tet_stretch_energy(volumes, rest), double((volumes.array() <= 0.0).count())};
+  const Vec volumes = volume::signed_tet_volumes(x, tets);
+  return {volume::tet_stretch_energy(volumes, rest), double((volumes.array() <= 0.0).count())};
 }
 
 // What any assembly has to move: the tets, their volumes and positions once each, the values of the
@@ -59,10 +59,11 @@ double assembly_bytes(double tets, double vertices, double entries, double rows)
 
 void assembly_stage(const SolidTorus& solid, const Problem& p, const Settings& settings,
                     const Report& report) {
-  std::unique_ptr<TetLaplacian> laplacian;
+  std::unique_ptr<volume::TetLaplacian> laplacian;
   Record row = measure(
       row_name("volume.pattern", solid, settings),
-      [&] { laplacian = std::make_unique<TetLaplacian>(solid.tets, p.fixed, p.rest); }, 0.3, 3);
+      [&] { laplacian = std::make_unique<volume::TetLaplacian>(solid.tets, p.fixed, p.rest); }, 0.3,
+      3);
   SparseMatrix matrix = laplacian->pattern();
   row.counters = {{"rows", matrix.rows()}, {"entries", matrix.nonZeros()}};
   report(row);
@@ -88,12 +89,12 @@ void assembly_stage(const SolidTorus& solid, const Problem& p, const Settings& s
 
 void vsem_stages(const SolidTorus& solid, const Problem& p, const Settings& settings,
                  const Report& report, Points& x) {
-  SolveOptions options;
+  linalg::SolveOptions options;
   options.tol = 1e-8;
   options.max_iter = 1000;
-  VolumetricStretch stretch(solid.tets, p.fixed, p.rest, "auto");
+  volume::VolumetricStretch stretch(solid.tets, p.fixed, p.rest, "auto");
   x = p.x;
-  SolveReport solved;
+  linalg::SolveReport solved;
   Record row = measure(
       row_name("volume.harmonic", solid, settings),
       [&] { solved = stretch.harmonic(p.V, x, options); }, 0.0, 1);
@@ -127,9 +128,9 @@ void vsem_stages(const SolidTorus& solid, const Problem& p, const Settings& sett
       {"peak_bytes_per_tet", peak_resident_bytes() / solid.tets.rows()}};
   report(row);
 
-  ElementMeasures measures;
+  measures::ElementMeasures measures;
   row = measure(row_name("distortion.tets", solid, settings),
-                [&] { measures = tet_measures(p.V, solid.tets, x); });
+                [&] { measures = measures::tet_measures(p.V, solid.tets, x); });
   row.counters = {{"image_volume", measures.image.sum()}};
   report(row);
 }
@@ -139,22 +140,22 @@ void vsem_stages(const SolidTorus& solid, const Problem& p, const Settings& sett
 void newton_stages(const SolidTorus& solid, const Problem& p, const Settings& settings,
                    const Report& report) {
   Points x = solid.standard * (p.R / solid.R);
-  std::unique_ptr<SolidNewton> newton;
+  std::unique_ptr<volume::SolidNewton> newton;
   Record row = measure(
       row_name("newton.setup", solid, settings),
       [&] {
-        newton = std::make_unique<SolidNewton>(SolidEnergy(
-            solid.tets, rest_matrices(p.V, solid.tets, 6.0), p.rest, p.fixed, p.R, p.r, x));
+        newton = std::make_unique<volume::SolidNewton>(volume::SolidEnergy(
+            solid.tets, volume::rest_matrices(p.V, solid.tets, 6.0), p.rest, p.fixed, p.R, p.r, x));
       },
       0.0, 1);
   row.counters = {{"rows", newton->energy().rows()}};
   report(row);
 
-  EnergyWeights weights;
+  volume::EnergyWeights weights;
   weights.volume = 10.0;
-  NewtonOptions options;
+  volume::NewtonOptions options;
   options.tol = 0.1;
-  NewtonReport last;
+  volume::NewtonReport last;
   double cg = 0.0, first = 0.0;
   row = measure(
       row_name("newton.steps", solid, settings),

@@ -1,4 +1,4 @@
-// What every binding file needs: casters, the poll that keeps Ctrl-C alive, the registration hooks.
+// What every binding file needs: casters, the poll that keeps Ctrl-C alive, release of the GIL.
 #pragma once
 
 #include <pybind11/eigen.h>
@@ -10,7 +10,7 @@
 
 namespace py = pybind11;
 
-namespace stretchmap::bindings {
+namespace stretchmap {
 
 // To be handed to long loops that run without the GIL: turns a pending Ctrl-C into an exception.
 inline Poll signal_poll() {
@@ -22,4 +22,4 @@ inline Poll signal_poll() {
 
 using release_gil = py::call_guard<py::gil_scoped_release>;
 
-}  // namespace stretchmap::bindings
+}  // namespace stretchmap

@@ -1,16 +1,17 @@
 #include "arrays.hpp"
-#include "stretchmap/stretch/chart.hpp"
-#include "stretchmap/stretch/surface_newton.hpp"
-#include "stretchmap/stretch/surface_quality.hpp"
-#include "stretchmap/stretch/surface_sem.hpp"
-#include "stretchmap/stretch/surface_stretch.hpp"
+#include "stretchmap/area/chart.hpp"
+#include "stretchmap/area/surface_newton.hpp"
+#include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/area/surface_sem.hpp"
 
-namespace stretchmap::bindings {
+namespace stretchmap::area {
 namespace {
+
+SurfaceWeights weights_of(double area, double shape, double chart) { return {area, shape, chart}; }
 
 void bind_chart(py::module_& m) {
   py::class_<SurfaceChart>(m, "SurfaceChart")
-      .def(py::init([](const SurfaceTopology& top, const IndexRows& forms) {
+      .def(py::init([](const mesh::SurfaceTopology& top, const IndexRows& forms) {
              return surface_chart(top, forms);
            }),
            py::arg("topology"), py::arg("forms").noconvert(), release_gil())
@@ -18,35 +19,7 @@ void bind_chart(py::module_& m) {
       .def_readonly("shift_u", &SurfaceChart::shift_u)
       .def_readonly("shift_v", &SurfaceChart::shift_v);
   m.def("turn_areas", &turn_areas, py::arg("chart"), py::arg("turns").noconvert(), release_gil());
-  m.def("equal_area_from_angle", &equal_area_from_angle, py::arg("v"), py::arg("tube_ratio"),
-        release_gil());
   m.def("angle_from_equal_area", &angle_from_equal_area, py::arg("s"), py::arg("tube_ratio"),
-        release_gil());
-}
-
-void bind_stretch(py::module_& m) {
-  m.def("surface_stretch_energy", &surface_stretch_energy, py::arg("faces").noconvert(),
-        py::arg("areas"), py::arg("image").noconvert(), release_gil());
-  m.def(
-      "surface_stretch_laplacian",
-      [](const FacesRef& faces, const VecRef& areas, const PointsRef& image) {
-        const SurfacePattern pattern(faces, static_cast<Index>(image.rows()), 1);
-        return surface_stretch_laplacian(pattern, faces, areas, image);
-      },
-      py::arg("faces").noconvert(), py::arg("areas"), py::arg("image").noconvert(), release_gil());
-  m.def("chart_stretch_energy", &chart_stretch_energy, py::arg("chart"), py::arg("areas"),
-        py::arg("periods"), py::arg("turns").noconvert(), release_gil());
-  m.def(
-      "chart_stretch_laplacian",
-      [](const SurfaceChart& chart, const VecRef& areas, const Eigen::Vector2d& periods,
-         const Points2Ref& turns) {
-        const SurfacePattern pattern(chart.faces, chart.n_vertices, 1);
-        return chart_stretch_laplacian(pattern, chart, areas, periods, turns);
-      },
-      py::arg("chart"), py::arg("areas"), py::arg("periods"), py::arg("turns").noconvert(),
-      release_gil());
-  m.def("chart_stretch_product", &chart_stretch_product, py::arg("chart"), py::arg("areas"),
-        py::arg("periods"), py::arg("frozen").noconvert(), py::arg("turns").noconvert(),
         release_gil());
 }
 
@@ -82,26 +55,11 @@ void bind_quality(py::module_& m) {
       .def_readonly("face_sd", &SurfaceQuality::face_sd)
       .def_readonly("angle_mean", &SurfaceQuality::angle_mean)
       .def_readonly("angle_max", &SurfaceQuality::angle_max);
-  m.def("surface_quality", &surface_quality, py::arg("reference"), py::arg("faces").noconvert(),
-        py::arg("image").noconvert(), release_gil());
-  m.def("torus_image", &torus_image, py::arg("turns").noconvert(), py::arg("phase"),
-        py::arg("ratio"), release_gil());
   m.def("phase_qualities", &phase_qualities, py::arg("reference"), py::arg("faces").noconvert(),
         py::arg("turns").noconvert(), py::arg("candidates").noconvert(), release_gil());
 }
 
-template <int K>
-Vec solve_once(const SparseMatrix& matrix, const VecRef& right) {
-  BlockLdlt<K> factor(matrix);
-  factor.factorise(matrix);
-  return factor.solve(right);
-}
-
-SurfaceWeights weights_of(double area, double shape, double chart) { return {area, shape, chart}; }
-
 void bind_glide(py::module_& m) {
-  m.def("block_ldlt_solve_2", &solve_once<2>, py::arg("matrix"), py::arg("right"), release_gil());
-  m.def("block_ldlt_solve_3", &solve_once<3>, py::arg("matrix"), py::arg("right"), release_gil());
   py::class_<GlideProblem>(m, "GlideProblem")
       .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio,
                        bool facing) {
@@ -109,23 +67,6 @@ void bind_glide(py::module_& m) {
            }),
            py::arg("chart"), py::arg("reference"), py::arg("ratio"), py::arg("facing") = false,
            release_gil());
-  m.def(
-      "glide_energy",
-      [](const GlideProblem& problem, double area, double shape, double chart, double scale,
-         const Points2Ref& angles, bool model) {
-        GlideEnergy energy = glide_energy(problem, weights_of(area, shape, chart), scale, angles,
-                                          model ? Derivatives::kModel : Derivatives::kHessian);
-        const SurfacePattern pattern(problem.chart.faces, problem.chart.n_vertices, 2);
-        SparseMatrix hessian = pattern.zeros();
-        pattern.scatter(energy.hessians, hessian.valuePtr());
-        return std::make_tuple(energy.value, std::move(energy.gradient), std::move(hessian));
-      },
-      py::arg("problem"), py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("scale"),
-      py::arg("angles").noconvert(), py::arg("model") = false, release_gil());
-  m.def("best_scale", &best_scale, py::arg("problem"), py::arg("angles").noconvert(),
-        release_gil());
-  m.def("glide_areas", &glide_areas, py::arg("problem"), py::arg("angles").noconvert(),
-        release_gil());
   py::class_<GlideStep>(m, "GlideStep")
       .def_readonly("before", &GlideStep::before)
       .def_readonly("after", &GlideStep::after)
@@ -154,12 +95,11 @@ void bind_glide(py::module_& m) {
 
 }  // namespace
 
-void bind_area(py::module_& m) {
+void bind(py::module_& m) {
   bind_chart(m);
-  bind_stretch(m);
   bind_sem(m);
   bind_quality(m);
   bind_glide(m);
 }
 
-}  // namespace stretchmap::bindings
+}  // namespace stretchmap::area

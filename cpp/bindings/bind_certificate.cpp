@@ -1,14 +1,9 @@
 #include "arrays.hpp"
 #include "stretchmap/certificate/embedding.hpp"
-#include "stretchmap/certificate/predicates.hpp"
 #include "stretchmap/certificate/torus_graph.hpp"
 
-namespace stretchmap::bindings {
-
-void bind_certificate(py::module_& m) {
-  m.def("orient3d", &orient3d, py::arg("a"), py::arg("b"), py::arg("c"), py::arg("d"));
-  m.def("orient2d", &orient2d, py::arg("a"), py::arg("b"), py::arg("c"), py::arg("axis"));
-
+namespace stretchmap::certificate {
+void bind(py::module_& m) {
   const auto points = py::arg("points").noconvert();
   const auto faces = py::arg("faces").noconvert();
   m.def("not_positive_tets", &not_positive_tets, points, py::arg("tets").noconvert(),
@@ -25,4 +20,4 @@ void bind_certificate(py::module_& m) {
   m.def("torus_graph", &torus_graph, points, faces, py::arg("R"), release_gil());
 }
 
-}  // namespace stretchmap::bindings
+}  // namespace stretchmap::certificate

@@ -4,12 +4,9 @@
 #include "stretchmap/forms/hodge.hpp"
 #include "stretchmap/forms/intrinsic_delaunay.hpp"
 
-namespace stretchmap::bindings {
-
-void bind_forms(py::module_& m) {
+namespace stretchmap::forms {
+void bind(py::module_& m) {
   m.def("cotangent_weights", &cotangent_weights, py::arg("topology"), py::arg("points").noconvert(),
-        release_gil());
-  m.def("weighted_laplacian", &weighted_laplacian, py::arg("topology"), py::arg("weights"),
         release_gil());
   m.def(
       "harmonic_forms",
@@ -20,11 +17,9 @@ void bind_forms(py::module_& m) {
       },
       py::arg("n_vertices"), py::arg("edges").noconvert(), py::arg("weights"), py::arg("eta"),
       release_gil());
-  m.def("form_vectors", &form_vectors, py::arg("topology"), py::arg("points").noconvert(),
-        py::arg("form"), release_gil());
   m.def(
       "hodge_products",
-      [](const SurfaceTopology& top, const PointsRef& points, const RowsRef& forms) {
+      [](const mesh::SurfaceTopology& top, const PointsRef& points, const RowsRef& forms) {
         HodgeProducts products = hodge_products(top, points, forms);
         return std::make_pair(std::move(products.star), std::move(products.wedge));
       },
@@ -33,7 +28,7 @@ void bind_forms(py::module_& m) {
         release_gil());
   m.def(
       "intrinsic_delaunay",
-      [](const SurfaceTopology& top, const VecRef& edge_length,
+      [](const mesh::SurfaceTopology& top, const VecRef& edge_length,
          const Eigen::Ref<const IndexRows>& eta) {
         IntrinsicDelaunay result = intrinsic_delaunay(top, edge_length, eta);
         return std::make_tuple(std::move(result.edges), std::move(result.weights),
@@ -42,4 +37,4 @@ void bind_forms(py::module_& m) {
       py::arg("topology"), py::arg("edge_length"), py::arg("eta").noconvert(), release_gil());
 }
 
-}  // namespace stretchmap::bindings
+}  // namespace stretchmap::forms

@@ -4,14 +4,11 @@
 #include "stretchmap/homology/solid_cohomology.hpp"
 #include "stretchmap/homology/tree_cotree.hpp"
 
-namespace stretchmap::bindings {
-
-void bind_homology(py::module_& m) {
-  m.def("edge_lengths", &edge_lengths, py::arg("topology"), py::arg("points").noconvert(),
-        release_gil());
+namespace stretchmap::homology {
+void bind(py::module_& m) {
   m.def(
       "tree_cotree",
-      [](const SurfaceTopology& top, const VecRef& length) {
+      [](const mesh::SurfaceTopology& top, const VecRef& length) {
         HomologyGenerators result = tree_cotree(top, length);
         return std::make_pair(std::move(result.loops), std::move(result.forms));
       },
@@ -20,19 +17,16 @@ void bind_homology(py::module_& m) {
         release_gil());
   m.def("wedge_matrix", &wedge_matrix, py::arg("topology"), py::arg("forms"), release_gil());
   m.def(
-      "linking_number",
-      [](const PointsRef& p, const PointsRef& q) { return linking_number(p, q, signal_poll()); },
-      py::arg("p"), py::arg("q"), release_gil());
-  m.def(
       "linking_matrix",
-      [](const SurfaceTopology& top, const PointsRef& points, const std::vector<Loop>& loops) {
+      [](const mesh::SurfaceTopology& top, const PointsRef& points,
+         const std::vector<Loop>& loops) {
         return linking_matrix(top, points, loops, signal_poll());
       },
       py::arg("topology"), py::arg("points").noconvert(), py::arg("loops"), release_gil());
   m.def(
       "shortest_loop",
-      [](const SurfaceTopology& top, const VecRef& length, const Eigen::Ref<const IndexRows>& forms,
-         const IndexVec& target, const Loop& crossing) {
+      [](const mesh::SurfaceTopology& top, const VecRef& length,
+         const Eigen::Ref<const IndexRows>& forms, const IndexVec& target, const Loop& crossing) {
         return shortest_loop(top, length, forms, target, crossing, signal_poll());
       },
       py::arg("topology"), py::arg("edge_length"), py::arg("forms").noconvert(), py::arg("target"),
@@ -48,4 +42,4 @@ void bind_homology(py::module_& m) {
       py::arg("loops"), release_gil());
 }
 
-}  // namespace stretchmap::bindings
+}  // namespace stretchmap::homology

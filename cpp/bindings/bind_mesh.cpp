@@ -6,7 +6,7 @@
 #include "stretchmap/mesh/surface_topology.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
 
-namespace stretchmap::bindings {
+namespace stretchmap::mesh {
 namespace {
 
 void bind_topology(py::module_& m) {
@@ -20,7 +20,6 @@ void bind_topology(py::module_& m) {
       .def_readonly("edges", &SurfaceTopology::edges)
       .def_readonly("edge_halfedge", &SurfaceTopology::edge_halfedge)
       .def_readonly("vertex_halfedge", &SurfaceTopology::vertex_halfedge);
-
   py::class_<TetBoundary>(m, "TetBoundary")
       .def(py::init(
                [](const TetsRef& tets, Index n) { return tet_boundary(tets, n, signal_poll()); }),
@@ -29,11 +28,6 @@ void bind_topology(py::module_& m) {
       .def_readonly("vertices", &TetBoundary::vertices)
       .def_readonly("index", &TetBoundary::index)
       .def_readonly("tets", &TetBoundary::tets);
-
-  m.def(
-      "tet_neighbours",
-      [](const TetsRef& tets, Index n) { return tet_neighbours(tets, n, signal_poll()); },
-      py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil());
   m.def(
       "tet_edges", [](const TetsRef& tets, Index n) { return tet_edges(tets, n, signal_poll()); },
       py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil());
@@ -45,6 +39,8 @@ void bind_sizes(py::module_& m) {
   const auto tets = py::arg("tets").noconvert();
   m.def("face_area_vectors", &face_area_vectors, points, faces, release_gil());
   m.def("face_areas", &face_areas, points, faces, release_gil());
+  m.def("edge_lengths", &edge_lengths, py::arg("topology"), py::arg("points").noconvert(),
+        release_gil());
   m.def("tet_volumes", &tet_volumes, points, tets, release_gil());
   m.def("enclosed_volume", &enclosed_volume, points, faces, release_gil());
   m.def("misoriented_faces", &misoriented_faces, points, faces, release_gil());
@@ -68,7 +64,6 @@ void bind_diagnosis(py::module_& m) {
       .def_readonly("component", &SurfaceDiagnosis::component)
       .def_readonly("euler", &SurfaceDiagnosis::euler)
       .def_readonly("genus", &SurfaceDiagnosis::genus);
-
   py::class_<SolidDiagnosis>(m, "SolidDiagnosis")
       .def(py::init([](const PointsRef& points, const TetsRef& tets) {
              return diagnose_solid(points, tets, signal_poll());
@@ -99,7 +94,6 @@ void bind_boundary_joins(py::module_& m) {
       .def_readonly("edges", &BoundaryJoins::edges)
       .def_readonly("faces", &BoundaryJoins::faces)
       .def_readonly("tets", &BoundaryJoins::tets);
-
   py::class_<Refinement>(m, "Refinement")
       .def(py::init([](const PointsRef& points, const TetsRef& tets) {
              return refine_boundary_joins(points, tets, signal_poll());
@@ -113,11 +107,11 @@ void bind_boundary_joins(py::module_& m) {
 
 }  // namespace
 
-void bind_mesh(py::module_& m) {
+void bind(py::module_& m) {
   bind_topology(m);
   bind_sizes(m);
   bind_diagnosis(m);
   bind_boundary_joins(m);
 }
 
-}  // namespace stretchmap::bindings
+}  // namespace stretchmap::mesh

@@ -1,21 +1,50 @@
-// The extension module: one bind_<stage> per stage, and the translation of core errors.
+// The extension module: one submodule per room, and the translation of core errors.
 #include "arrays.hpp"
 
-namespace stretchmap::bindings {
-void bind_forms(py::module_& m);
-void bind_homology(py::module_& m);
-void bind_mesh(py::module_& m);
-void bind_volume(py::module_& m);
-void bind_linalg(py::module_& m);
-void bind_distortion(py::module_& m);
-void bind_area(py::module_& m);
-void bind_certificate(py::module_& m);
-void bind_apply(py::module_& m);
-void bind_threads(py::module_& m);
-}  // namespace stretchmap::bindings
+namespace stretchmap::base {
+void bind(py::module_& m);
+}
+namespace stretchmap::mesh {
+void bind(py::module_& m);
+}
+namespace stretchmap::forms {
+void bind(py::module_& m);
+}
+namespace stretchmap::homology {
+void bind(py::module_& m);
+}
+namespace stretchmap::linalg {
+void bind(py::module_& m);
+}
+namespace stretchmap::measures {
+void bind(py::module_& m);
+}
+namespace stretchmap::maps {
+void bind(py::module_& m);
+}
+namespace stretchmap::certificate {
+void bind(py::module_& m);
+}
+namespace stretchmap::partitions {
+void bind(py::module_& m);
+}
+namespace stretchmap::area {
+void bind(py::module_& m);
+}
+namespace stretchmap::volume {
+void bind(py::module_& m);
+}
+namespace stretchmap::registration {
+void bind(py::module_& m);
+}
+namespace stretchmap::resample {
+void bind(py::module_& m);
+}
+namespace stretchmap::testing {
+void bind(py::module_& m);
+}
 
 PYBIND11_MODULE(_core, m) {
-  using namespace stretchmap::bindings;
   m.doc() = "C++ core of stretchmap; private, its arguments are validated by the Python layer.";
 
   py::register_exception_translator([](std::exception_ptr pointer) {
@@ -28,14 +57,22 @@ PYBIND11_MODULE(_core, m) {
     }
   });
 
-  bind_mesh(m);
-  bind_volume(m);
-  bind_homology(m);
-  bind_forms(m);
-  bind_linalg(m);
-  bind_distortion(m);
-  bind_area(m);
-  bind_certificate(m);
-  bind_apply(m);
-  bind_threads(m);
+  const auto room = [&](const char* name, void (*bind)(py::module_&)) {
+    py::module_ inner = m.def_submodule(name);
+    bind(inner);
+  };
+  room("base", stretchmap::base::bind);
+  room("mesh", stretchmap::mesh::bind);
+  room("forms", stretchmap::forms::bind);
+  room("homology", stretchmap::homology::bind);
+  room("linalg", stretchmap::linalg::bind);
+  room("measures", stretchmap::measures::bind);
+  room("maps", stretchmap::maps::bind);
+  room("certificate", stretchmap::certificate::bind);
+  room("partitions", stretchmap::partitions::bind);
+  room("area", stretchmap::area::bind);
+  room("volume", stretchmap::volume::bind);
+  room("registration", stretchmap::registration::bind);
+  room("resample", stretchmap::resample::bind);
+  room("testing", stretchmap::testing::bind);
 }

@@ -5,9 +5,9 @@
 #include <numeric>
 #include <vector>
 
-#include "stretchmap/certificate/predicates.hpp"
+#include "stretchmap/base/predicates.hpp"
 
-namespace stretchmap {
+namespace stretchmap::certificate {
 namespace {
 
 using Triple = Eigen::Matrix<Index, 1, 3>;
@@ -195,4 +195,4 @@ Edges crossing_faces(const PointsRef& points, const FacesRef& faces, Index limit
   return out;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::certificate

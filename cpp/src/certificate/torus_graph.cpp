@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-namespace stretchmap {
+namespace stretchmap::certificate {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -87,4 +87,4 @@ TorusGraph torus_graph(const PointsRef& points, const FacesRef& faces, double R)
   return out;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::certificate

@@ -5,9 +5,9 @@
 
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::forms {
 
-Vec cotangent_weights(const SurfaceTopology& top, const PointsRef& points) {
+Vec cotangent_weights(const mesh::SurfaceTopology& top, const PointsRef& points) {
   Vec weights = Vec::Zero(top.edges.rows());
   std::vector<Index> at_fault;
   for (Index f = 0; f < top.faces.rows(); ++f) {
@@ -32,7 +32,7 @@ Vec cotangent_weights(const SurfaceTopology& top, const PointsRef& points) {
   return weights;
 }
 
-SparseMatrix weighted_laplacian(const SurfaceTopology& top, const VecRef& weights) {
+SparseMatrix weighted_laplacian(const mesh::SurfaceTopology& top, const VecRef& weights) {
   std::vector<Eigen::Triplet<double, Index>> entries;
   entries.reserve(4 * weights.size());
   for (Index e = 0; e < weights.size(); ++e) {
@@ -47,4 +47,4 @@ SparseMatrix weighted_laplacian(const SurfaceTopology& top, const VecRef& weight
   return laplacian;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::forms

@@ -6,7 +6,7 @@
 
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::forms {
 namespace {
 
 // Lower triangle of the Laplacian without row and column 0.
@@ -62,4 +62,4 @@ HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const V
   return result;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::forms

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace stretchmap {
+namespace stretchmap::forms {
 namespace {
 
 struct FaceFrame {
@@ -11,7 +11,7 @@ struct FaceFrame {
   double area;
 };
 
-FaceFrame face_frame(const SurfaceTopology& top, const PointsRef& points, Index f) {
+FaceFrame face_frame(const mesh::SurfaceTopology& top, const PointsRef& points, Index f) {
   FaceFrame frame;
   for (int k = 0; k < 3; ++k) frame.corners.col(k) = points.row(top.faces(f, k)).transpose();
   const Eigen::Vector3d cross = (frame.corners.col(1) - frame.corners.col(0))
@@ -23,7 +23,7 @@ FaceFrame face_frame(const SurfaceTopology& top, const PointsRef& points, Index 
 
 // (3.6) with corners measured from corner 0, which a closed form does not notice.
 template <class Form>
-Eigen::Vector3d face_vector(const SurfaceTopology& top, const FaceFrame& frame, Index f,
+Eigen::Vector3d face_vector(const mesh::SurfaceTopology& top, const FaceFrame& frame, Index f,
                             const Form& form) {
   const auto along = [&](Index h) { return top.sign(h) * form[top.edge[h]]; };
   const Eigen::Vector3d sum = along(3 * f) * (frame.corners.col(2) - frame.corners.col(0)) +
@@ -33,7 +33,7 @@ Eigen::Vector3d face_vector(const SurfaceTopology& top, const FaceFrame& frame, 
 
 }  // namespace
 
-Points form_vectors(const SurfaceTopology& top, const PointsRef& points, const VecRef& form) {
+Points form_vectors(const mesh::SurfaceTopology& top, const PointsRef& points, const VecRef& form) {
   Points vectors(top.faces.rows(), 3);
   for (Index f = 0; f < top.faces.rows(); ++f) {
     vectors.row(f) = face_vector(top, face_frame(top, points, f), f, form).transpose();
@@ -41,7 +41,7 @@ Points form_vectors(const SurfaceTopology& top, const PointsRef& points, const V
   return vectors;
 }
 
-HodgeProducts hodge_products(const SurfaceTopology& top, const PointsRef& points,
+HodgeProducts hodge_products(const mesh::SurfaceTopology& top, const PointsRef& points,
                              const RowsRef& forms) {
   const Index k = static_cast<Index>(forms.rows());
   HodgeProducts products{Rows::Zero(k, k), Rows::Zero(k, k)};
@@ -60,7 +60,7 @@ HodgeProducts hodge_products(const SurfaceTopology& top, const PointsRef& points
   return products;
 }
 
-Vec chart_areas(const SurfaceTopology& top, const VecRef& first, const VecRef& second) {
+Vec chart_areas(const mesh::SurfaceTopology& top, const VecRef& first, const VecRef& second) {
   Vec areas(top.faces.rows());
   for (Index f = 0; f < top.faces.rows(); ++f) {
     const auto along = [&](const VecRef& form, Index h) { return top.sign(h) * form[top.edge[h]]; };
@@ -71,4 +71,4 @@ Vec chart_areas(const SurfaceTopology& top, const VecRef& first, const VecRef& s
   return areas;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::forms

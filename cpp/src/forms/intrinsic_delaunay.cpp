@@ -6,13 +6,13 @@
 
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::forms {
 namespace {
 
 // Half-edge mesh with lengths; half-edge 3 f + k belongs to face f for ever, what it holds changes.
 class Flipper {
  public:
-  Flipper(const SurfaceTopology& top, const VecRef& edge_length,
+  Flipper(const mesh::SurfaceTopology& top, const VecRef& edge_length,
           const Eigen::Ref<const IndexRows>& eta)
       : slots_(3 * top.faces.rows()),
         halfedge_(top.edge_halfedge.data(), top.edge_halfedge.data() + top.edges.rows()) {
@@ -65,7 +65,7 @@ class Flipper {
     out.eta.resize(eta_.rows(), n);
     for (Index e = 0; e < n; ++e) {
       const Index h = halfedge_[e];
-      out.edges.row(e) << slots_[h].tail, slots_[SurfaceTopology::next(h)].tail;
+      out.edges.row(e) << slots_[h].tail, slots_[mesh::SurfaceTopology::next(h)].tail;
       out.weights[e] = weight(e);
       out.eta.col(e) = eta_.col(h);
     }
@@ -81,8 +81,8 @@ class Flipper {
   // (b^2 + c^2 - a^2) / (4 area), the area by Heron's formula in Kahan's stable order.
   double opposite_cotangent(Index h) const {
     const double a = slots_[h].length;
-    const double b = slots_[SurfaceTopology::next(h)].length;
-    const double c = slots_[SurfaceTopology::prev(h)].length;
+    const double b = slots_[mesh::SurfaceTopology::next(h)].length;
+    const double c = slots_[mesh::SurfaceTopology::prev(h)].length;
     double x = a, y = b, z = c;
     if (x < y) std::swap(x, y);
     if (x < z) std::swap(x, z);
@@ -94,8 +94,8 @@ class Flipper {
   // Replaces the diagonal ab of the quadrilateral a d b c by cd; returns the four sides.
   std::array<Index, 4> flip(Index h) {
     const Index t = slots_[h].twin;
-    const Index hn = SurfaceTopology::next(h), hp = SurfaceTopology::prev(h);
-    const Index tn = SurfaceTopology::next(t), tp = SurfaceTopology::prev(t);
+    const Index hn = mesh::SurfaceTopology::next(h), hp = mesh::SurfaceTopology::prev(h);
+    const Index tn = mesh::SurfaceTopology::next(t), tp = mesh::SurfaceTopology::prev(t);
     const double diagonal = other_diagonal(h, t);
     const std::array<Index, 4> from{tp, hn, hp, tn};  // d->b, b->c, c->a, a->d
     const std::array<Index, 4> to{hn, hp, tn, tp};    // face of h: c d b, face of t: d c a
@@ -132,10 +132,10 @@ class Flipper {
       return Eigen::Vector2d(x, std::sqrt(std::max(from_a * from_a - x * x, 0.0)));
     };
     const double ab = slots_[h].length;
-    const Eigen::Vector2d c =
-        apex(ab, slots_[SurfaceTopology::prev(h)].length, slots_[SurfaceTopology::next(h)].length);
-    const Eigen::Vector2d d =
-        apex(ab, slots_[SurfaceTopology::next(t)].length, slots_[SurfaceTopology::prev(t)].length);
+    const Eigen::Vector2d c = apex(ab, slots_[mesh::SurfaceTopology::prev(h)].length,
+                                   slots_[mesh::SurfaceTopology::next(h)].length);
+    const Eigen::Vector2d d = apex(ab, slots_[mesh::SurfaceTopology::next(t)].length,
+                                   slots_[mesh::SurfaceTopology::prev(t)].length);
     return std::hypot(c[0] - d[0], c[1] + d[1]);
   }
 
@@ -146,7 +146,7 @@ class Flipper {
 
 }  // namespace
 
-IntrinsicDelaunay intrinsic_delaunay(const SurfaceTopology& top, const VecRef& edge_length,
+IntrinsicDelaunay intrinsic_delaunay(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                                      const Eigen::Ref<const IndexRows>& eta) {
   Flipper flipper(top, edge_length, eta);
   const Index n_flips = flipper.run();
@@ -155,4 +155,4 @@ IntrinsicDelaunay intrinsic_delaunay(const SurfaceTopology& top, const VecRef& e
   return result;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::forms

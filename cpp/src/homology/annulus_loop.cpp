@@ -1,4 +1,4 @@
-#include "annulus_loop.hpp"
+#include "homology/annulus_loop.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <queue>
 #include <utility>
 
-namespace stretchmap {
+namespace stretchmap::homology {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -26,15 +26,15 @@ struct CutGraph {
 
   Index size() const { return static_cast<Index>(vertex.size()); }
   Index left(Index h) const { return tail[h]; }
-  Index left_head(Index h) const { return tail[SurfaceTopology::next(h)]; }
+  Index left_head(Index h) const { return tail[mesh::SurfaceTopology::next(h)]; }
 };
 
-CutGraph cut_open(const SurfaceTopology& top, const VecRef& edge_length,
+CutGraph cut_open(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                   const std::vector<char>& is_cut) {
   CutGraph graph;
   graph.tail.resize(top.twin.size());
   for (Index i = 0; i < top.n_vertices; ++i) {
-    const auto turn = [&](Index h) { return top.twin[SurfaceTopology::prev(h)]; };
+    const auto turn = [&](Index h) { return top.twin[mesh::SurfaceTopology::prev(h)]; };
     Index first = top.vertex_halfedge[i];
     while (!is_cut[top.edge[first]] && turn(first) != top.vertex_halfedge[i]) first = turn(first);
     Index h = first;
@@ -123,7 +123,7 @@ class PathSearch {
 double none(Index) { return 0.0; }
 
 // The half-edges of a shortest path from the left border of the annulus to its right border.
-std::vector<Index> path_across(const SurfaceTopology& top, const VecRef& edge_length,
+std::vector<Index> path_across(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                                const std::vector<Index>& cut, const std::vector<char>& is_cut,
                                const Poll& poll) {
   const CutGraph annulus = cut_open(top, edge_length, is_cut);
@@ -146,8 +146,8 @@ std::vector<Index> path_across(const SurfaceTopology& top, const VecRef& edge_le
 
 }  // namespace
 
-Loop shortest_in_annulus(const SurfaceTopology& top, const VecRef& edge_length, const Loop& cut,
-                         const Poll& poll) {
+Loop shortest_in_annulus(const mesh::SurfaceTopology& top, const VecRef& edge_length,
+                         const Loop& cut, const Poll& poll) {
   std::vector<char> is_cut(top.edges.rows(), 0);
   const std::vector<Index> border = loop_halfedges(top, cut);
   Loop shortest = cut;
@@ -198,4 +198,4 @@ Loop shortest_in_annulus(const SurfaceTopology& top, const VecRef& edge_length, 
   return shortest;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

@@ -3,7 +3,7 @@
 
 #include "stretchmap/homology/tree_cotree.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
 // The shortest loop of edges that is homotopic to `cut` in the surface cut open along it, `cut`
 // itself if none is shorter.
@@ -14,7 +14,7 @@ namespace stretchmap {
 // distance to the right copies of all of P as estimate. Vertices that the estimate, or the length
 // through another vertex of P less twice the distance, shows to be too far are spared.
 // \pre    genus one, `cut` a simple loop that does not separate.
-Loop shortest_in_annulus(const SurfaceTopology& top, const VecRef& edge_length, const Loop& cut,
-                         const Poll& poll = {});
+Loop shortest_in_annulus(const mesh::SurfaceTopology& top, const VecRef& edge_length,
+                         const Loop& cut, const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

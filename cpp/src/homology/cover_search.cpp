@@ -1,11 +1,11 @@
-#include "cover_search.hpp"
+#include "homology/cover_search.hpp"
 
 #include <algorithm>
 #include <utility>
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
-CoverSearch::CoverSearch(const SurfaceTopology& top, const VecRef& edge_length,
+CoverSearch::CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                          const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
                          Poll poll)
     : poll_(std::move(poll)), n_vertices_(top.n_vertices), start_(top.n_vertices + 1) {
@@ -141,4 +141,4 @@ Loop CoverSearch::path_to(Index sheet, Index i) {
   return path;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

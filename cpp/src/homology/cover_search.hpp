@@ -10,7 +10,7 @@
 
 #include "stretchmap/homology/tree_cotree.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
 // Nodes of the cover are a vertex and a sheet in Z^k, the sheet changing by the forms along each
 // edge. A ball about a vertex meets its translate by the target at half the length of the shortest
@@ -18,7 +18,7 @@ namespace stretchmap {
 // lie in pages made on first use and are valid when stamped with the current source.
 class CoverSearch {
  public:
-  CoverSearch(const SurfaceTopology& top, const VecRef& edge_length,
+  CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_length,
               const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target, Poll poll);
 
   // Looks for loops through vertex v shorter than `cutoff` and keeps the best of all searches.
@@ -73,4 +73,4 @@ class CoverSearch {
   Loop loop_;
 };
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

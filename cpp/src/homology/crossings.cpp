@@ -1,10 +1,10 @@
-#include "crossings.hpp"
+#include "homology/crossings.hpp"
 
 #include <cmath>
 #include <utility>
 #include <vector>
 
-namespace stretchmap {
+namespace stretchmap::homology {
 namespace {
 
 constexpr Index kLeaf = 4;  // segments that are not split any further
@@ -162,4 +162,4 @@ bool count_touch(const Touch& touch, Crossings& sum) {
   return true;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

@@ -5,7 +5,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
 // Signed crossings of p and q seen along z; each counts by the sign of (upper x lower).z. For
 // disjoint closed polygons both sums are the linking number.
@@ -38,4 +38,4 @@ struct Touch {
 // Adds the crossings of that segment with that part of the polyline q; false where undecided.
 bool count_touch(const Touch& touch, Crossings& sum);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

@@ -2,23 +2,23 @@
 
 #include <string>
 
-#include "crossings.hpp"
+#include "homology/crossings.hpp"
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 namespace {
 
 constexpr int kTries = 8;  // directions of projection
 
 // The half-edges that the loop on the left of `loop` crosses, each from its left to its right side.
-std::vector<Index> left_crossings(const SurfaceTopology& top, const Loop& loop) {
+std::vector<Index> left_crossings(const mesh::SurfaceTopology& top, const Loop& loop) {
   const std::vector<Index> along = loop_halfedges(top, loop);
   std::vector<Index> crossings, fan;
   for (std::size_t k = 0; k < along.size(); ++k) {
     const Index incoming = along[(k + along.size() - 1) % along.size()];
     fan.clear();
-    for (Index h = top.twin[SurfaceTopology::prev(along[k])]; h != top.twin[incoming];
-         h = top.twin[SurfaceTopology::prev(h)]) {
+    for (Index h = top.twin[mesh::SurfaceTopology::prev(along[k])]; h != top.twin[incoming];
+         h = top.twin[mesh::SurfaceTopology::prev(h)]) {
       fan.push_back(h);
     }
     crossings.insert(crossings.end(), fan.rbegin(), fan.rend());
@@ -27,7 +27,7 @@ std::vector<Index> left_crossings(const SurfaceTopology& top, const Loop& loop) 
 }
 
 // A direction out of the solid at the edge of half-edge h.
-Eigen::Vector3d outward(const SurfaceTopology& top, const PointsRef& points, Index h) {
+Eigen::Vector3d outward(const mesh::SurfaceTopology& top, const PointsRef& points, Index h) {
   const auto normal = [&](Index f) -> Eigen::Vector3d {
     const Eigen::Vector3d x = points.row(top.faces(f, 0));
     const Eigen::Vector3d y = points.row(top.faces(f, 1));
@@ -44,7 +44,7 @@ struct MidpointLoop {
   Points outward;  // at each point
 };
 
-MidpointLoop loop_on_the_left(const SurfaceTopology& top, const PointsRef& points,
+MidpointLoop loop_on_the_left(const mesh::SurfaceTopology& top, const PointsRef& points,
                               const Loop& loop) {
   const std::vector<Index> crossings = left_crossings(top, loop);
   const Index n = static_cast<Index>(crossings.size());
@@ -63,7 +63,8 @@ struct EdgeLoop {
   IndexVec edge;  // from each point to the next
 };
 
-EdgeLoop loop_of_edges(const SurfaceTopology& top, const PointsRef& points, const Loop& loop) {
+EdgeLoop loop_of_edges(const mesh::SurfaceTopology& top, const PointsRef& points,
+                       const Loop& loop) {
   const std::vector<Index> along = loop_halfedges(top, loop);
   const Index n = static_cast<Index>(along.size());
   EdgeLoop result{Points(n, 3), IndexVec(n)};
@@ -122,7 +123,7 @@ std::int64_t linking_number(const PointsRef& p, const PointsRef& q, const Poll& 
   return number;
 }
 
-LinkingMatrix linking_matrix(const SurfaceTopology& top, const PointsRef& points,
+LinkingMatrix linking_matrix(const mesh::SurfaceTopology& top, const PointsRef& points,
                              const std::vector<Loop>& loops, const Poll& poll) {
   const Index n = static_cast<Index>(loops.size());
   LinkingMatrix matrix(n, n);
@@ -150,4 +151,4 @@ LinkingMatrix linking_matrix(const SurfaceTopology& top, const PointsRef& points
   return matrix;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

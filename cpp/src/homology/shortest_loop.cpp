@@ -5,11 +5,11 @@
 #include <limits>
 #include <utility>
 
-#include "annulus_loop.hpp"
-#include "cover_search.hpp"
+#include "homology/annulus_loop.hpp"
+#include "homology/cover_search.hpp"
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 namespace {
 
 bool is_simple(Loop loop) {
@@ -26,8 +26,8 @@ Loop without_stem(const Loop& loop) {
 }
 
 // Searches from vertices of `crossing` until no other can lie on a shorter loop.
-Loop shortest_through(const SurfaceTopology& top, const VecRef& edge_length, const Loop& crossing,
-                      CoverSearch& search) {
+Loop shortest_through(const mesh::SurfaceTopology& top, const VecRef& edge_length,
+                      const Loop& crossing, CoverSearch& search) {
   const Index n = static_cast<Index>(crossing.size());
   Vec arc(n + 1);  // distance along `crossing` from its first vertex
   arc[0] = 0.0;
@@ -49,7 +49,7 @@ Loop shortest_through(const SurfaceTopology& top, const VecRef& edge_length, con
 
 }  // namespace
 
-Loop shortest_loop(const SurfaceTopology& top, const VecRef& edge_length,
+Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                    const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
                    const Loop& crossing, const Poll& poll) {
   CoverSearch search(top, edge_length, forms, target, poll);
@@ -71,4 +71,4 @@ Loop shortest_loop(const SurfaceTopology& top, const VecRef& edge_length,
   return loop;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

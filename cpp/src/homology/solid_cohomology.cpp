@@ -8,7 +8,7 @@
 
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 namespace {
 
 // Integer combination of unknowns, sorted by unknown, no zero coefficients.
@@ -236,4 +236,4 @@ SolidCohomology solid_cohomology(const TetsRef& tets, const EdgesRef& edges, Ind
   return result;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

@@ -9,7 +9,7 @@
 
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 namespace {
 
 struct PrimalTree {
@@ -17,7 +17,7 @@ struct PrimalTree {
   std::vector<double> depth;  // distance from the root
 };
 
-PrimalTree shortest_path_tree(const SurfaceTopology& top, const VecRef& length) {
+PrimalTree shortest_path_tree(const mesh::SurfaceTopology& top, const VecRef& length) {
   const double infinity = std::numeric_limits<double>::infinity();
   PrimalTree tree{std::vector<Index>(top.n_vertices, -1),
                   std::vector<double>(top.n_vertices, infinity)};
@@ -39,7 +39,7 @@ PrimalTree shortest_path_tree(const SurfaceTopology& top, const VecRef& length) 
         tree.parent[j] = h;
         queue.emplace(candidate, j);
       }
-      h = top.twin[SurfaceTopology::prev(h)];
+      h = top.twin[mesh::SurfaceTopology::prev(h)];
     } while (h != first);
   }
   for (Index i = 0; i < top.n_vertices; ++i) {
@@ -61,7 +61,7 @@ Index find_root(std::vector<Index>& leader, Index f) {
 
 // Kruskal on the dual graph, longest closing loop first. Marks the edges that the cotree crosses
 // and returns those that neither tree uses, shortest closing loop first.
-std::vector<Index> grow_cotree(const SurfaceTopology& top, const VecRef& length,
+std::vector<Index> grow_cotree(const mesh::SurfaceTopology& top, const VecRef& length,
                                const PrimalTree& tree, std::vector<char>& crossed) {
   const Index n_edges = static_cast<Index>(top.edges.rows());
   std::vector<char> in_tree(n_edges, 0);
@@ -97,7 +97,8 @@ std::vector<Index> grow_cotree(const SurfaceTopology& top, const VecRef& length,
 }
 
 // For each face the half-edge of that face across which its dual parent lies, -1 at the root.
-std::vector<Index> dual_parents(const SurfaceTopology& top, const std::vector<char>& crossed) {
+std::vector<Index> dual_parents(const mesh::SurfaceTopology& top,
+                                const std::vector<char>& crossed) {
   std::vector<Index> parent(top.faces.rows(), -2), queue{0};
   parent[0] = -1;
   for (std::size_t at = 0; at < queue.size(); ++at) {
@@ -111,7 +112,8 @@ std::vector<Index> dual_parents(const SurfaceTopology& top, const std::vector<ch
   return parent;
 }
 
-std::vector<Index> path_from_root(const SurfaceTopology& top, const PrimalTree& tree, Index i) {
+std::vector<Index> path_from_root(const mesh::SurfaceTopology& top, const PrimalTree& tree,
+                                  Index i) {
   std::vector<Index> path{i};
   while (tree.parent[i] >= 0) path.push_back(i = top.tail(tree.parent[i]));
   std::reverse(path.begin(), path.end());
@@ -119,7 +121,7 @@ std::vector<Index> path_from_root(const SurfaceTopology& top, const PrimalTree& 
 }
 
 // Tree path to the tail, the half-edge itself, tree path back; the common part dropped.
-Loop close_loop(const SurfaceTopology& top, const PrimalTree& tree, Index h) {
+Loop close_loop(const mesh::SurfaceTopology& top, const PrimalTree& tree, Index h) {
   const std::vector<Index> there = path_from_root(top, tree, top.tail(h));
   const std::vector<Index> back = path_from_root(top, tree, top.head(h));
   std::size_t common = 1;
@@ -131,7 +133,7 @@ Loop close_loop(const SurfaceTopology& top, const PrimalTree& tree, Index h) {
 
 }  // namespace
 
-HomologyGenerators tree_cotree(const SurfaceTopology& top, const VecRef& edge_length) {
+HomologyGenerators tree_cotree(const mesh::SurfaceTopology& top, const VecRef& edge_length) {
   const PrimalTree tree = shortest_path_tree(top, edge_length);
   std::vector<char> crossed;
   const std::vector<Index> left_over = grow_cotree(top, edge_length, tree, crossed);
@@ -157,25 +159,17 @@ HomologyGenerators tree_cotree(const SurfaceTopology& top, const VecRef& edge_le
   return result;
 }
 
-Vec edge_lengths(const SurfaceTopology& top, const PointsRef& points) {
-  Vec length(top.edges.rows());
-  for (Index e = 0; e < length.size(); ++e) {
-    length[e] = (points.row(top.edges(e, 1)) - points.row(top.edges(e, 0))).norm();
-  }
-  return length;
-}
-
-Index find_halfedge(const SurfaceTopology& top, Index i, Index j) {
+Index find_halfedge(const mesh::SurfaceTopology& top, Index i, Index j) {
   const Index first = top.vertex_halfedge[i];
   Index h = first;
   do {
     if (top.head(h) == j) return h;
-    h = top.twin[SurfaceTopology::prev(h)];
+    h = top.twin[mesh::SurfaceTopology::prev(h)];
   } while (h != first);
   return -1;
 }
 
-std::vector<Index> loop_halfedges(const SurfaceTopology& top, const Loop& loop) {
+std::vector<Index> loop_halfedges(const mesh::SurfaceTopology& top, const Loop& loop) {
   std::vector<Index> path(loop.size());
   for (std::size_t k = 0; k < loop.size(); ++k) {
     const Index next = loop[(k + 1) % loop.size()];
@@ -190,7 +184,7 @@ std::vector<Index> loop_halfedges(const SurfaceTopology& top, const Loop& loop) 
   return path;
 }
 
-IndexVec periods(const SurfaceTopology& top, const Eigen::Ref<const IndexRows>& forms,
+IndexVec periods(const mesh::SurfaceTopology& top, const Eigen::Ref<const IndexRows>& forms,
                  const Loop& loop) {
   IndexVec sum = IndexVec::Zero(forms.rows());
   for (const Index h : loop_halfedges(top, loop)) {
@@ -199,7 +193,7 @@ IndexVec periods(const SurfaceTopology& top, const Eigen::Ref<const IndexRows>& 
   return sum;
 }
 
-Rows wedge_matrix(const SurfaceTopology& top, const RowsRef& forms) {
+Rows wedge_matrix(const mesh::SurfaceTopology& top, const RowsRef& forms) {
   const Index k = static_cast<Index>(forms.rows());
   Rows wedge = Rows::Zero(k, k);
   for (Index f = 0; f < top.faces.rows(); ++f) {
@@ -211,4 +205,4 @@ Rows wedge_matrix(const SurfaceTopology& top, const RowsRef& forms) {
   return wedge;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

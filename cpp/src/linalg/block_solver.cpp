@@ -3,12 +3,11 @@
 #include <optional>
 #include <utility>
 
-#include "iterative.hpp"
+#include "linalg/iterative.hpp"
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::linalg {
 
-using namespace linalg;
 Rows translations(Index n) {
   Rows modes = Rows::Zero(3 * static_cast<Eigen::Index>(n), 3);
   for (Index i = 0; i < n; ++i) modes.middleRows<3>(3 * static_cast<Eigen::Index>(i)).setIdentity();
@@ -139,4 +138,4 @@ SolveReport BlockSolver::solve(const PointsRef& b, Eigen::Ref<Points> x,
   return report;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::linalg

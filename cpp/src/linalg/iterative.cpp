@@ -1,9 +1,9 @@
-#include "iterative.hpp"
+#include "linalg/iterative.hpp"
 
 #include <cmath>
 #include <utility>
 
-#include "ordering.hpp"
+#include "linalg/ordering.hpp"
 
 namespace stretchmap::linalg {
 

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "convergence_watch.hpp"
-#include "multigrid.hpp"
-#include "pcg.hpp"
+#include "linalg/krylov/convergence_watch.hpp"
+#include "linalg/krylov/pcg.hpp"
+#include "linalg/multigrid/multigrid.hpp"
 
 namespace stretchmap::linalg {
 

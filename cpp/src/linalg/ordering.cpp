@@ -1,4 +1,4 @@
-#include "ordering.hpp"
+#include "linalg/ordering.hpp"
 
 #include <cstddef>
 

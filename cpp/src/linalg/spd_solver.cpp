@@ -4,16 +4,14 @@
 #include <optional>
 #include <utility>
 
-#include "cholesky.hpp"
-#include "cholmod.hpp"
-#include "iterative.hpp"
-#include "refined_solve.hpp"
+#include "linalg/direct/cholesky.hpp"
+#include "linalg/direct/cholmod.hpp"
+#include "linalg/direct/refined_solve.hpp"
+#include "linalg/iterative.hpp"
 #include "stretchmap/base/errors.hpp"
 
-namespace stretchmap {
+namespace stretchmap::linalg {
 namespace {
-
-using namespace linalg;
 
 // A triangulated surface has 7 entries per row, a tetrahedral mesh up to 15; the fill of their
 // factors differs far more. The limits are where a factorisation costs as much as a multigrid
@@ -182,4 +180,4 @@ SolveReport SpdSolver::solve(const RowsRef& B, Eigen::Ref<Rows> X, const SolveOp
   return report;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::linalg

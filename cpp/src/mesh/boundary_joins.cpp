@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis_common.hpp"
+#include "mesh/diagnosis_common.hpp"
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 namespace {
 
 using Tet = Eigen::Matrix<Index, 1, 4>;
@@ -76,7 +76,7 @@ void plan_edges(const TetsRef& tets, Index n_vertices, const Rim& rim, Plan& pla
       plan.splits.push_back({groups.order[p] / 6, vertex, {a, b, -1}, 2});
     }
   }
-  plan.joins.edges = detail::as_rows<Edges>(edges);
+  plan.joins.edges = as_rows<Edges>(edges);
 }
 
 // Added vertices are numbered from `first_vertex`.
@@ -95,11 +95,11 @@ void plan_faces(const TetsRef& tets, Index n_vertices, Index first_vertex, const
       plan.splits.push_back({groups.order[p] / 4, vertex, {f[0], f[1], f[2]}, 3});
     }
   }
-  plan.joins.faces = detail::as_rows<Faces>(faces);
+  plan.joins.faces = as_rows<Faces>(faces);
 }
 
 Plan plan_splits(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  const IndexVec repeated = set_entries(detail::repeating(tets));
+  const IndexVec repeated = set_entries(repeating(tets));
   if (repeated.size() > 0) {
     throw Error("DegenerateError",
                 std::to_string(repeated.size()) + " tets repeat a vertex, the first is tet " +
@@ -175,10 +175,10 @@ Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets, c
     refined.insert(refined.end(), pieces.begin(), pieces.end());
     parents.insert(parents.end(), pieces.size(), t);
   }
-  result.tets = detail::as_rows<Tets>(refined);
-  result.parent_tet = detail::as_vector(parents);
+  result.tets = as_rows<Tets>(refined);
+  result.parent_tet = as_vector(parents);
   result.joins = std::move(plan.joins);
   return result;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -1,8 +1,8 @@
-#include "diagnosis_common.hpp"
+#include "mesh/diagnosis_common.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
 #include "stretchmap/mesh/size.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 namespace {
 
 using Triple = Eigen::Matrix<Index, 1, 3>;
@@ -22,7 +22,7 @@ void orientation(const PointsRef& points, const TetsRef& tets, const FacetGroups
   report.degenerate = set_entries(no_volume);
   report.inverted = set_entries(folded);
   report.misoriented = set_entries(turn);
-  report.conflicts = detail::as_vector(patches.conflicts);
+  report.conflicts = as_vector(patches.conflicts);
 }
 
 void boundary(const PointsRef& points, const TetsRef& tets, const FacetGroups& faces,
@@ -36,7 +36,7 @@ void boundary(const PointsRef& points, const TetsRef& tets, const FacetGroups& f
     if (members > 2) crowded.push_back(half_face(tets, h));
   }
   std::sort(single.begin(), single.end());
-  report.nonmanifold_faces = detail::as_rows<Faces>(crowded);
+  report.nonmanifold_faces = as_rows<Faces>(crowded);
   report.boundary_faces.resize(static_cast<Index>(single.size()), 3);
   for (std::size_t f = 0; f < single.size(); ++f) {
     report.boundary_faces.row(f) = half_face(tets, single[f]);
@@ -83,7 +83,7 @@ void vertex_links(const TetsRef& tets, const FacetGroups& faces, const FacetGrou
     for (const int k : kTetEdge[h % 6]) ++euler[tets(h / 6, k)];
   }
   Mask unsound(n_vertices, 0), used(n_vertices, 0);
-  detail::mark_split_corners(tets, skip, corners, unsound);
+  mark_split_corners(tets, skip, corners, unsound);
   for (Index t = 0; t < tets.rows(); ++t) {
     for (int k = 0; k < 4 && !skip[t]; ++k) used[tets(t, k)] = 1;
   }
@@ -98,7 +98,7 @@ void topology(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& 
               const Mask& skip, Index n_vertices, SolidDiagnosis& report) {
   const Components parts = components(tets, n_vertices, skip);
   report.component = parts.element;
-  report.unreferenced = detail::negative_entries(parts.vertex);
+  report.unreferenced = negative_entries(parts.vertex);
   report.euler.setZero(parts.count);
   for (Index i = 0; i < n_vertices; ++i) {
     if (parts.vertex[i] >= 0) ++report.euler[parts.vertex[i]];
@@ -122,7 +122,7 @@ SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets, cons
   };
   const Index n_vertices = static_cast<Index>(points.rows());
   SolidDiagnosis report;
-  const detail::LeftOut out = detail::left_out(tets, group_equal_tets(tets, n_vertices, poll));
+  const LeftOut out = left_out(tets, group_equal_tets(tets, n_vertices, poll));
   const Mask& skip = out.either;
   report.repeated = set_entries(out.repeated);
   report.duplicates = set_entries(out.copies);
@@ -139,4 +139,4 @@ SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets, cons
   return report;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -1,8 +1,8 @@
-#include "diagnosis_common.hpp"
+#include "mesh/diagnosis_common.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
 #include "stretchmap/mesh/size.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 namespace {
 
 using Pair = Eigen::Matrix<Index, 1, 2>;
@@ -33,7 +33,7 @@ void orientation(const PointsRef& points, const FacesRef& faces, const FacetGrou
   }
   report.misoriented = set_entries(against);
   report.inside_out = set_entries(inside_out);
-  report.conflicts = detail::as_vector(patches.conflicts);
+  report.conflicts = as_vector(patches.conflicts);
 }
 
 // Edges by their number of faces, and the fans of faces round each vertex.
@@ -56,10 +56,10 @@ void manifoldness(const FacesRef& faces, const FacetGroups& groups, const Mask& 
       corners.unite(corner_of(h, b), corner_of(groups.order[p], b));
     }
   }
-  report.border_edges = detail::as_rows<Edges>(borders);
-  report.nonmanifold_edges = detail::as_rows<Edges>(crowded);
+  report.border_edges = as_rows<Edges>(borders);
+  report.nonmanifold_edges = as_rows<Edges>(crowded);
   Mask split(n_vertices, 0);
-  detail::mark_split_corners(faces, skip, corners, split);
+  mark_split_corners(faces, skip, corners, split);
   report.nonmanifold_vertices = set_entries(split);
 }
 
@@ -67,7 +67,7 @@ void topology(const FacesRef& faces, const FacetGroups& groups, const Mask& skip
               SurfaceDiagnosis& report) {
   const Components parts = components(faces, n_vertices, skip);
   report.component = parts.element;
-  report.unreferenced = detail::negative_entries(parts.vertex);
+  report.unreferenced = negative_entries(parts.vertex);
   report.euler.setZero(parts.count);
   for (Index i = 0; i < n_vertices; ++i) {
     if (parts.vertex[i] >= 0) ++report.euler[parts.vertex[i]];
@@ -95,7 +95,7 @@ void topology(const FacesRef& faces, const FacetGroups& groups, const Mask& skip
 SurfaceDiagnosis diagnose_surface(const PointsRef& points, const FacesRef& faces) {
   const Index n_vertices = static_cast<Index>(points.rows());
   SurfaceDiagnosis report;
-  const detail::LeftOut out = detail::left_out(faces, group_equal_faces(faces, n_vertices));
+  const LeftOut out = left_out(faces, group_equal_faces(faces, n_vertices));
   const Mask& skip = out.either;
   const auto flat = degenerate_faces(points, faces);
   Mask no_area(skip.size(), 0);
@@ -113,4 +113,4 @@ SurfaceDiagnosis diagnose_surface(const PointsRef& points, const FacesRef& faces
   return report;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

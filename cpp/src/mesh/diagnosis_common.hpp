@@ -8,7 +8,7 @@
 #include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/orient.hpp"
 
-namespace stretchmap::detail {
+namespace stretchmap::mesh {
 
 template <class Elements>
 Mask repeating(const Elements& elements) {
@@ -84,4 +84,4 @@ void mark_split_corners(const Elements& elements, const Mask& skip, DisjointSets
   }
 }
 
-}  // namespace stretchmap::detail
+}  // namespace stretchmap::mesh

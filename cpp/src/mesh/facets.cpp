@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 namespace {
 
 // All but the lowest vertex of a facet in ascending order, packed, and the facet.
@@ -137,4 +137,4 @@ int same_turn(const Eigen::Matrix<Index, 1, 3>& a, const Eigen::Matrix<Index, 1,
   return 0;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "diagnosis_common.hpp"
+#include "mesh/diagnosis_common.hpp"
 #include "stretchmap/mesh/size.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 namespace {
 
 // Union-find in which every element knows whether it agrees with its root.
@@ -135,14 +135,14 @@ Mask tets_to_turn(const PointsRef& points, const TetsRef& tets, const Patches& p
 
 IndexVec misoriented_faces(const PointsRef& points, const FacesRef& faces) {
   const Index n = static_cast<Index>(points.rows());
-  const Mask skip = detail::left_out(faces, group_equal_faces(faces, n)).either;
+  const Mask skip = left_out(faces, group_equal_faces(faces, n)).either;
   const Patches patches = face_patches(faces, group_half_edges(faces, n, skip), skip);
   return set_entries(faces_to_turn(points, faces, patches));
 }
 
 IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets) {
   const Index n = static_cast<Index>(points.rows());
-  const Mask skip = detail::left_out(tets, group_equal_tets(tets, n)).either;
+  const Mask skip = left_out(tets, group_equal_tets(tets, n)).either;
   const Patches patches = tet_patches(tets, group_half_faces(tets, n, skip), skip);
   return set_entries(tets_to_turn(points, tets, patches));
 }
@@ -156,4 +156,4 @@ IndexVec set_entries(const Mask& mask) {
   return entries;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 namespace {
 
 constexpr double kFlat = 1e-12;
@@ -87,4 +87,12 @@ Eigen::Array<bool, Eigen::Dynamic, 1> degenerate_tets(const PointsRef& points,
   return flat;
 }
 
-}  // namespace stretchmap
+Vec edge_lengths(const SurfaceTopology& top, const PointsRef& points) {
+  Vec length(top.edges.rows());
+  for (Index e = 0; e < length.size(); ++e) {
+    length[e] = (points.row(top.edges(e, 1)) - points.row(top.edges(e, 0))).norm();
+  }
+  return length;
+}
+
+}  // namespace stretchmap::mesh

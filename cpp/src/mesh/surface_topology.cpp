@@ -7,7 +7,7 @@
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/mesh/facets.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 namespace {
 
 std::string name(Index i, Index j) {
@@ -66,4 +66,4 @@ SurfaceTopology surface_topology(const FacesRef& faces, Index n_vertices) {
   return top;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

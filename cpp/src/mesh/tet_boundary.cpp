@@ -7,7 +7,7 @@
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/mesh/facets.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices, const Poll& poll) {
   const FacetGroups groups = group_half_faces(tets, n_vertices, {}, poll);
@@ -69,4 +69,4 @@ Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll) {
   return edges;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

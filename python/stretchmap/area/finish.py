@@ -26,7 +26,7 @@ _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the ring
 
 
 def finish_areas(
-    newton: _core.SurfaceNewton,
+    newton: _core.area.SurfaceNewton,
     rings: bool,
     max_iter: int,
     tol: float,
@@ -71,14 +71,14 @@ def finish_areas(
     )
 
 
-def _within(figures: _core.SurfaceFigures, tol: float) -> bool:
+def _within(figures: _core.area.SurfaceFigures, tol: float) -> bool:
     return figures.face_sd <= tol and figures.face_error <= _RATIO_GOAL * tol
 
 
 def _record(
     iteration: int,
-    taken: _core.GlideStep | None,
-    figures: _core.SurfaceFigures,
+    taken: _core.area.GlideStep | None,
+    figures: _core.area.SurfaceFigures,
     start: float,
 ) -> IterationRecord:
     return IterationRecord(

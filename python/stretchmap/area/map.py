@@ -191,7 +191,7 @@ def area_map(
         conformal = conformal_map(surface, basis)
     clock = _lap(seconds, "conformal", clock)
 
-    chart = _core.SurfaceChart(surface.topology, conformal.forms)
+    chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
     turns, history = minimise_stretch(surface, chart, conformal, sem_iter, progress)
     clock = _lap(seconds, "sem", clock)
 
@@ -202,8 +202,10 @@ def area_map(
 
     records, converged, reason = [], True, "stretch energy at rest"
     if finish != "none":
-        problem = _core.GlideProblem(chart, _core.SurfaceReference(surface.V, surface.F), ratio)
-        newton = _core.SurfaceNewton(problem, angles)
+        problem = _core.area.GlideProblem(
+            chart, _core.area.SurfaceReference(surface.V, surface.F), ratio
+        )
+        newton = _core.area.SurfaceNewton(problem, angles)
         records, converged, reason = finish_areas(
             newton, finish == "ring", max_iter, tol, shape_budget, progress
         )

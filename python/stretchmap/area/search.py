@@ -29,7 +29,7 @@ def search_phase(
     sample = surface.F[:: -(-len(surface.F) // _SAMPLE)]
     used, faces = np.unique(sample, return_inverse=True)
     faces = faces.reshape(sample.shape).astype(np.int32)
-    reference = _core.SurfaceReference(surface.V[used], faces)
+    reference = _core.area.SurfaceReference(surface.V[used], faces)
     turns = turns[used]
     phases = np.arange(_PHASES) / _PHASES if phase is None else np.array([float(phase)])
     conformal = conformal_torus(aspect).ratio
@@ -54,12 +54,12 @@ def search_phase(
 
 
 def _best(
-    reference: _core.SurfaceReference,
+    reference: _core.area.SurfaceReference,
     faces: NDArray[np.int32],
     turns: NDArray[np.float64],
     candidates: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     if len(candidates) == 1:
         return candidates[0]
-    qualities = _core.phase_qualities(reference, faces, turns, candidates)
+    qualities = _core.area.phase_qualities(reference, faces, turns, candidates)
     return candidates[int(np.argmin([quality.energy for quality in qualities]))]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def minimise_stretch(
     surface: TriMesh,
-    chart: _core.SurfaceChart,
+    chart: _core.area.SurfaceChart,
     conformal: ConformalMap,
     max_iter: int,
     progress: Progress | None,
@@ -29,12 +29,12 @@ def minimise_stretch(
     """Steps of (4.5) in the chart until the energy is at its bound or stops falling."""
     start = time.perf_counter()
     turns = conformal.turns
-    if (_core.turn_areas(chart, turns) <= 0.0).any():
+    if (_core.area.turn_areas(chart, turns) <= 0.0).any():
         # Positive weights embed the surface in a flat torus whatever its triangles (Tutte).
         weights = np.ones(len(surface.edges))
         forms = conformal.forms.astype(float)
-        turns = _core.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
-    sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, turns)
+        turns = _core.forms.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
+    sem = _core.area.SurfaceSem(chart, surface.face_areas, conformal.aspect, turns)
     history: list[IterationRecord] = []
     taken = None
     for iteration in range(max_iter + 1):
@@ -61,7 +61,7 @@ def minimise_stretch(
 
 
 def start_angles(
-    chart: _core.SurfaceChart, turns: NDArray[np.float64], phase: float, ratio: float
+    chart: _core.area.SurfaceChart, turns: NDArray[np.float64], phase: float, ratio: float
 ) -> NDArray[np.float64]:
     """(u, v) in radians from (u, s) in turns, without flipped faces where there are none in (u, s).
 
@@ -70,8 +70,8 @@ def start_angles(
     s = TWO_PI * (turns[:, 1] + phase)
     bend = 1.0 / ratio
     while True:
-        v = _core.angle_from_equal_area(s, bend)
+        v = _core.area.angle_from_equal_area(s, bend)
         bent = np.column_stack([turns[:, 0], v / TWO_PI])
-        if bend == 0.0 or (_core.turn_areas(chart, bent) > 0.0).all():
+        if bend == 0.0 or (_core.area.turn_areas(chart, bent) > 0.0).all():
             return np.column_stack([TWO_PI * turns[:, 0], v])
         bend = 0.8 * bend if bend > 0.01 else 0.0

@@ -50,12 +50,12 @@ def threads(count: int | None) -> Iterator[None]:
         raise OptionError(f"threads must be an integer, got {count!r}") from None
     if not 1 <= wanted <= 1024:
         raise OptionError(f"threads must be between 1 and 1024, got {wanted}")
-    before = _core.thread_count()
-    _core.set_thread_count(wanted)
+    before = _core.base.thread_count()
+    _core.base.set_thread_count(wanted)
     try:
         yield
     finally:
-        _core.set_thread_count(before)
+        _core.base.set_thread_count(before)
 
 
 def takes_threads(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:

@@ -153,14 +153,14 @@ def _topology(found: Findings, mesh: TetMesh | TriMesh) -> bool:
 def _positive(
     found: Findings, name: str, V: NDArray[np.float64], T: NDArray[np.int32], what: str
 ) -> None:
-    bad = _core.not_positive_tets(V, T)
+    bad = _core.certificate.not_positive_tets(V, T)
     found.note(name, not len(bad), f"{what} volume not positive: {describe('tet', bad)}", bad)
 
 
 def _embedded(
     found: Findings, name: str, V: NDArray[np.float64], F: NDArray[np.int32], what: str
 ) -> bool:
-    pairs = _core.crossing_faces(V, F, MOST_IDS)
+    pairs = _core.certificate.crossing_faces(V, F, MOST_IDS)
     return found.note(
         name,
         not len(pairs),
@@ -180,7 +180,7 @@ def _boundary(
     if torus is None:
         _embedded(found, "boundary_embedded", image, F, "boundary image")
         return "the boundary image does not cross itself (exact tests)"
-    graph = _core.torus_graph(image, F, torus.R)
+    graph = _core.certificate.torus_graph(image, F, torus.R)
     u, v, s = torus.coordinates(image)
     winding = graph.winding
     found.checks["boundary_graph"] = not len(graph.bad)
@@ -220,9 +220,9 @@ def _volumes(
     boundary_image: NDArray[np.float64],
     F: NDArray[np.int32],
 ) -> None:
-    volumes = _core.tet_volumes(image, T)
+    volumes = _core.mesh.tet_volumes(image, T)
     total = math.fsum(volumes)
-    enclosed = _core.enclosed_volume(boundary_image, F)
+    enclosed = _core.mesh.enclosed_volume(boundary_image, F)
     # Either sum is off by less than its number of terms in units of rounding of the bounding box.
     box = float(np.prod(np.ptp(image, axis=0)))
     bound = 8.0 * np.finfo(float).eps * (len(T) + len(F)) * box

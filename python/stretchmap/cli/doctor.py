@@ -66,7 +66,7 @@ def _threads() -> str:
     from .. import _core
 
     asked = os.environ.get("OMP_NUM_THREADS")
-    return f"{_core.thread_count()}" + (f" (OMP_NUM_THREADS={asked})" if asked else "")
+    return f"{_core.base.thread_count()}" + (f" (OMP_NUM_THREADS={asked})" if asked else "")
 
 
 def _installed(packages: tuple[str, ...]) -> str:

@@ -167,7 +167,7 @@ def conformal_map(
     basis.require_torus()
     middle = perf_counter()
     harmonic, forms, areas = _chart(surface, basis, WEIGHTS if weights == "auto" else (weights,))
-    cotangent = _core.cotangent_weights(surface.topology, surface.V)
+    cotangent = _core.forms.cotangent_weights(surface.topology, surface.V)
     gram = (forms * cotangent) @ forms.T
     aspect = math.sqrt(gram[1, 1] / gram[0, 0])
     turns = harmonic.potentials @ basis.torus_matrix.T
@@ -201,7 +201,7 @@ def _chart(
     for weights in choices:
         harmonic = harmonic_forms(surface, basis, weights=weights)
         forms = basis.torus_matrix @ harmonic.forms
-        areas = _core.chart_areas(surface.topology, forms[0], forms[1])
+        areas = _core.forms.chart_areas(surface.topology, forms[0], forms[1])
         folds = int((areas <= 0.0).sum())
         if best is None or folds < best[0]:
             best = (folds, harmonic, forms, areas)

@@ -61,17 +61,17 @@ def solve_harmonic(
     if weights not in WEIGHTS:
         raise OptionError(f"weights must be one of {', '.join(WEIGHTS)}, not {weights!r}")
     top, n = surface.topology, surface.n_vertices
-    values = _core.cotangent_weights(top, surface.V)
+    values = _core.forms.cotangent_weights(top, surface.V)
     n_negative, n_flips = int((values < 0.0).sum()), 0
     if weights == "intrinsic_delaunay":
-        lengths = _core.edge_lengths(top, surface.V)
-        edges, values, carried, n_flips = _core.intrinsic_delaunay(top, lengths, eta)
-        _, potentials, gram = _core.harmonic_forms(n, edges, values, carried)
+        lengths = _core.mesh.edge_lengths(top, surface.V)
+        edges, values, carried, n_flips = _core.forms.intrinsic_delaunay(top, lengths, eta)
+        _, potentials, gram = _core.forms.harmonic_forms(n, edges, values, carried)
         forms = eta + np.diff(potentials[top.edges], axis=1)[:, 0].T
     else:
         if weights == "clamped":
             values = np.maximum(values, CLAMP)
-        forms, potentials, gram = _core.harmonic_forms(n, top.edges, values, eta)
+        forms, potentials, gram = _core.forms.harmonic_forms(n, top.edges, values, eta)
     return HarmonicForms(
         forms=read_only(forms),
         potentials=read_only(potentials),

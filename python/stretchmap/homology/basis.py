@@ -157,13 +157,13 @@ class HomologyBasis:
         self, target: NDArray[np.int64], known: tuple[NDArray[np.int32], ...]
     ) -> NDArray[np.int32]:
         top = self.surface.topology
-        lengths = _core.edge_lengths(top, self.surface.V)
+        lengths = _core.mesh.edge_lengths(top, self.surface.V)
         crossing = [
             loop
             for loop in (*known, *self.generators)
-            if _core.periods(top, self.dual_forms, loop) @ self.intersection @ target
+            if _core.homology.periods(top, self.dual_forms, loop) @ self.intersection @ target
         ]
-        loop = _core.shortest_loop(
+        loop = _core.homology.shortest_loop(
             top, lengths, self.dual_forms, target.astype(np.int32), min(crossing, key=len)
         )
         return read_only(np.array(loop, dtype=np.int32))
@@ -181,7 +181,7 @@ class HomologyBasis:
         ArrayError
             Two consecutive vertices are not joined by an edge.
         """
-        return _core.periods(self.surface.topology, self.dual_forms, loop).astype(np.int64)
+        return _core.homology.periods(self.surface.topology, self.dual_forms, loop).astype(np.int64)
 
     def require_torus(self) -> None:
         """Check that the genus is one.
@@ -283,9 +283,9 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
     """
     surface.require_closed()
     top = surface.topology
-    lists, forms = _core.tree_cotree(top, _core.edge_lengths(top, surface.V))
+    lists, forms = _core.homology.tree_cotree(top, _core.mesh.edge_lengths(top, surface.V))
     loops = [np.array(loop, dtype=np.int32) for loop in lists]
-    wedge = np.rint(_core.wedge_matrix(top, forms.astype(float))).astype(np.int64)
+    wedge = np.rint(_core.homology.wedge_matrix(top, forms.astype(float))).astype(np.int64)
     intersection = integer_inverse(wedge).T
     harmonic = solve_harmonic(surface, forms)
 

@@ -26,7 +26,7 @@ def bounding_by_linking(
     surface lk(a, b outward) - lk(b, a outward) is minus the intersection number of a and b, each
     kind of class has rank g, and the two kinds meet in a unimodular matrix.
     """
-    linking = _core.linking_matrix(surface.topology, surface.V, loops)
+    linking = _core.homology.linking_matrix(surface.topology, surface.V, loops)
     inside, outside = integer_kernel(linking.T), integer_kernel(linking)
     if not (
         2 * len(inside) == 2 * len(outside) == len(loops)
@@ -50,7 +50,7 @@ def bounding_in(
             "the surface is not the boundary of the solid; pass solid.surface (its vertices are "
             "solid.boundary_vertices)"
         )
-    relations, values = _core.solid_cohomology(
+    relations, values = _core.homology.solid_cohomology(
         solid.T, solid.edges, solid.n_vertices, [solid.boundary_vertices[loop] for loop in loops]
     )
     cohomology = integer_kernel(relations)

@@ -77,7 +77,7 @@ def holomorphic_forms(surface: TriMesh, basis: HomologyBasis | None = None) -> H
         As `homology_basis`.
     """
     real = harmonic_forms(surface, basis).forms
-    star, wedge = _core.hodge_products(surface.topology, surface.V, real)
+    star, wedge = _core.forms.hodge_products(surface.topology, surface.V, real)
     coefficients = np.linalg.solve(wedge, star).T if len(real) else np.zeros((0, 0))
     return HolomorphicForms(
         real=real,

@@ -99,7 +99,7 @@ class PointMap:
         self._T = result.mesh.T
         self._ends = (result.mesh.V, as_points(result.image, "image"))
         self._tolerance = tolerance
-        self._locators: list[_core.TetLocator | None] = [None, None]
+        self._locators: list[_core.maps.TetLocator | None] = [None, None]
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the search structures, which are built anew where they are needed."""
@@ -135,7 +135,7 @@ class PointMap:
         if locator is None:
             V = self._ends[start]
             diagonal = float(np.linalg.norm(np.ptp(V, axis=0)))
-            locator = _core.TetLocator(V, self._T, self._tolerance * diagonal)
+            locator = _core.maps.TetLocator(V, self._T, self._tolerance * diagonal)
             self._locators[start] = locator
         tets, weights = locator.locate(queries)
         return Located(

@@ -152,14 +152,14 @@ def distortion(
     if isinstance(mesh, TetMesh):
         oriented = True
         elements = mesh.T
-        measures = _core.tet_measures(mesh.V, elements, points)
+        measures = _core.measures.tet_measures(mesh.V, elements, points)
         factor = 1.5
     else:
         sign = _orientation(mesh, points, torus, angles)
         oriented = sign is not None
         elements = mesh.F
         sign = np.ones(len(elements)) if sign is None else sign
-        measures = _core.face_measures(mesh.V, elements, points, sign)
+        measures = _core.measures.face_measures(mesh.V, elements, points, sign)
         factor = 1.0
     source, target = measures.source, measures.image
     _check_source(source)
@@ -169,8 +169,8 @@ def distortion(
         raise DegenerateError("the image has no area or volume; ratios are not defined")
     source_share, image_share = source / source_total, target / image_total
     ratios = image_share / source_share
-    source_ring = _core.ring_sums(elements, source_share, len(mesh.V))
-    image_ring = _core.ring_sums(elements, image_share, len(mesh.V))
+    source_ring = _core.measures.ring_sums(elements, source_share, len(mesh.V))
+    image_ring = _core.measures.ring_sums(elements, image_share, len(mesh.V))
     used = source_ring > 0.0
     ring_ratios = np.full(len(mesh.V), math.nan)
     np.divide(image_ring, source_ring, out=ring_ratios, where=used)

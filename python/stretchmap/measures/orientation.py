@@ -21,7 +21,7 @@ def outward_areas(
     torus : Torus
     """
     u, v, _ = torus.coordinates(image[faces].mean(axis=1))
-    return np.einsum("ij,ij->i", torus.normal(u, v), _core.face_area_vectors(image, faces))
+    return np.einsum("ij,ij->i", torus.normal(u, v), _core.mesh.face_area_vectors(image, faces))
 
 
 def chart_areas(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -57,5 +57,5 @@ def boundary_joins(solid: TetMesh) -> BoundaryJoins:
     DegenerateError
         Tets that repeat a vertex; ``ids`` are the tets.
     """
-    found = _core.BoundaryJoins(solid.T, solid.n_vertices)
+    found = _core.mesh.BoundaryJoins(solid.T, solid.n_vertices)
     return BoundaryJoins(found.edges, found.faces, found.tets)

@@ -212,7 +212,7 @@ class Diagnosis:
 
 def diagnose_surface(V: NDArray[np.float64], F: NDArray[np.int32]) -> Diagnosis:
     """Diagnose a surface given by validated arrays, see `TriMesh.diagnose`."""
-    found = _core.SurfaceDiagnosis(V, F)
+    found = _core.mesh.SurfaceDiagnosis(V, F)
     return Diagnosis(
         kind="surface",
         n_vertices=len(V),
@@ -226,7 +226,7 @@ def diagnose_surface(V: NDArray[np.float64], F: NDArray[np.int32]) -> Diagnosis:
 
 def diagnose_solid(V: NDArray[np.float64], T: NDArray[np.int32]) -> Diagnosis:
     """Diagnose a solid given by validated arrays, see `TetMesh.diagnose`."""
-    found = _core.SolidDiagnosis(V, T)
+    found = _core.mesh.SolidDiagnosis(V, T)
     parts = found.boundary_component
     cavity = parts != np.bincount(parts[parts >= 0], minlength=1).argmax()
     return Diagnosis(
@@ -241,7 +241,7 @@ def diagnose_solid(V: NDArray[np.float64], T: NDArray[np.int32]) -> Diagnosis:
     )
 
 
-def _common(found: _core.SurfaceDiagnosis | _core.SolidDiagnosis) -> dict[str, Ids]:
+def _common(found: _core.mesh.SurfaceDiagnosis | _core.mesh.SolidDiagnosis) -> dict[str, Ids]:
     return {
         "repeated": found.repeated,
         "duplicates": found.duplicates,

@@ -86,7 +86,7 @@ class TriMesh(_Mesh):
         faces = as_indices(F, 3, len(points), "F")
         n_turned = 0
         if orient:
-            turn = _core.misoriented_faces(points, faces)
+            turn = _core.mesh.misoriented_faces(points, faces)
             n_turned = len(turn)
             faces = _turned(faces, turn)
         self._set(V=points, F=faces, n_turned=n_turned)
@@ -103,7 +103,7 @@ class TriMesh(_Mesh):
         return len(self.F)
 
     @cached_property
-    def topology(self) -> _core.SurfaceTopology:
+    def topology(self) -> _core.mesh.SurfaceTopology:
         """Half-edges and edges (core object).
 
         Raises
@@ -113,7 +113,7 @@ class TriMesh(_Mesh):
         OrientationError
             Two faces that run along an edge in the same direction; ``ids`` are the faces.
         """
-        return _core.SurfaceTopology(self.F, self.n_vertices)
+        return _core.mesh.SurfaceTopology(self.F, self.n_vertices)
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
@@ -129,7 +129,7 @@ class TriMesh(_Mesh):
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
         """(m,) unsigned face areas."""
-        return read_only(_core.face_areas(self.V, self.F))
+        return read_only(_core.mesh.face_areas(self.V, self.F))
 
     @cached_property
     def area(self) -> float:
@@ -139,7 +139,7 @@ class TriMesh(_Mesh):
     @cached_property
     def volume(self) -> float:
         """Signed enclosed volume, positive with outward normals; meaningless with a border."""
-        return float(_core.enclosed_volume(self.V, self.F))
+        return float(_core.mesh.enclosed_volume(self.V, self.F))
 
     @property
     def n_components(self) -> int:
@@ -261,7 +261,7 @@ class TetMesh(_Mesh):
         tets = as_indices(T, 4, len(points), "T")
         n_turned = 0
         if orient:
-            turn = _core.misoriented_tets(points, tets)
+            turn = _core.mesh.misoriented_tets(points, tets)
             n_turned = len(turn)
             tets = _turned(tets, turn)
         self._set(V=points, T=tets, n_turned=n_turned)
@@ -278,8 +278,8 @@ class TetMesh(_Mesh):
         return len(self.T)
 
     @cached_property
-    def _boundary(self) -> _core.TetBoundary:
-        return _core.TetBoundary(self.T, self.n_vertices)
+    def _boundary(self) -> _core.mesh.TetBoundary:
+        return _core.mesh.TetBoundary(self.T, self.n_vertices)
 
     @cached_property
     def surface(self) -> TriMesh:
@@ -310,12 +310,12 @@ class TetMesh(_Mesh):
     @cached_property
     def edges(self) -> NDArray[np.int32]:
         """(e, 2) edges, lower id first, in lexicographic order."""
-        return read_only(_core.tet_edges(self.T, self.n_vertices))
+        return read_only(_core.mesh.tet_edges(self.T, self.n_vertices))
 
     @cached_property
     def tet_volumes(self) -> NDArray[np.float64]:
         """(k,) signed volumes, negative for an inverted tet."""
-        return read_only(_core.tet_volumes(self.V, self.T))
+        return read_only(_core.mesh.tet_volumes(self.V, self.T))
 
     @cached_property
     def volume(self) -> float:

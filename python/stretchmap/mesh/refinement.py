@@ -142,7 +142,7 @@ def refine_boundary_joins(solid: TetMesh) -> Refinement:
     DegenerateError
         Tets that repeat a vertex; ``ids`` are the tets.
     """
-    found = _core.Refinement(solid.V, solid.T)
+    found = _core.mesh.Refinement(solid.V, solid.T)
     joins = found.joins
     split = len(joins.edges) + len(joins.faces)
     return Refinement(

@@ -38,7 +38,7 @@ class Pieces:
 
     def volumes(self, of: str) -> NDArray[np.float64]:
         columns = slice(0, 3) if of == "source" else slice(3, 6)
-        return _core.tet_volumes(np.ascontiguousarray(self.points[:, columns]), self.T)
+        return _core.mesh.tet_volumes(np.ascontiguousarray(self.points[:, columns]), self.T)
 
     def only(self, chosen: NDArray[np.bool_]) -> Pieces:
         """The chosen tets, with the same points."""
@@ -82,7 +82,9 @@ class Pieces:
     def _split(
         self, T: NDArray[np.int32], values: NDArray[np.float64], gate: NDArray[np.float64]
     ) -> tuple[Pieces, NDArray[np.int32]]:
-        split = _core.split_tets(T, np.ascontiguousarray(values), np.ascontiguousarray(gate))
+        split = _core.partitions.split_tets(
+            T, np.ascontiguousarray(values), np.ascontiguousarray(gate)
+        )
         first, second = (self.points[split.cut_edges[:, k]] for k in (0, 1))
         added = first + split.cut_weight[:, None] * (second - first)
         return Pieces(

@@ -37,7 +37,7 @@ def levels_of(
         values = pieces.points[:, 7]
 
         def below(level: float) -> float:
-            return _core.volume_below(pieces.T, volumes, values - level)
+            return _core.partitions.volume_below(pieces.T, volumes, values - level)
 
         ends = (float(values.min()), float(values.max()))
     else:
@@ -60,8 +60,8 @@ def _sector_volume(pieces: Pieces, axis: str, start: float, of: str) -> Callable
     def below(angle: float) -> float:
         values = np.ascontiguousarray(halves.level_function(axis, angle)[0])
         if angle - start <= math.pi:
-            return _core.volume_below(*parts[0], values)
-        return first + _core.volume_below(*parts[1], values)
+            return _core.partitions.volume_below(*parts[0], values)
+        return first + _core.partitions.volume_below(*parts[1], values)
 
     return below
 

@@ -125,7 +125,7 @@ class Partition:
 
     def _faces(self, i: int) -> NDArray[np.int64]:
         tets = np.ascontiguousarray(self.solid.T[self._tets(i)])
-        boundary = _core.TetBoundary(tets, self.solid.n_vertices)
+        boundary = _core.mesh.TetBoundary(tets, self.solid.n_vertices)
         return boundary.vertices[boundary.faces].astype(np.int64)
 
     def to_dict(self) -> dict[str, Any]:

@@ -177,7 +177,7 @@ class _Pieces:
         return self.points[:, 3:]
 
     def cut(self, values: Array) -> _Pieces:
-        split = _core.split_tets(self.T, np.ascontiguousarray(values), np.zeros(0))
+        split = _core.partitions.split_tets(self.T, np.ascontiguousarray(values), np.zeros(0))
         first, second = (self.points[split.cut_edges[:, k]] for k in (0, 1))
         added = first + split.cut_weight[:, None] * (second - first)
         return _Pieces(
@@ -206,7 +206,7 @@ class _Pieces:
 
     def faces(self, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
         """Boundary faces of some of the tets, and the tet each belongs to."""
-        skin = _core.TetBoundary(np.ascontiguousarray(self.T[kept]), len(self.points))
+        skin = _core.mesh.TetBoundary(np.ascontiguousarray(self.T[kept]), len(self.points))
         return skin.vertices[skin.faces], np.flatnonzero(kept)[skin.tets]
 
 

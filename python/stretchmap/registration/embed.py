@@ -112,7 +112,7 @@ def embed_boundary(
     held : ndarray of int32
         Boundary vertices that stay where they are: landmarks.
     """
-    crossings = _core.crossing_faces(points, source.surface.F, _MOST_PAIRS)
+    crossings = _core.certificate.crossing_faces(points, source.surface.F, _MOST_PAIRS)
     start = EmbeddedBoundary(source, points, crossings)
     for way in (_follow, _overlay):
         if not len(crossings):
@@ -140,7 +140,7 @@ def _follow(
         at = np.concatenate([at, where])
         images = np.concatenate([images, target.points(where)])
         at, images = _settled(solid.surface, target, at, images, held, len(where))
-        crossings = _core.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
+        crossings = _core.certificate.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
         since = 0 if len(crossings) < fewest else since + 1
         fewest = min(fewest, len(crossings))
     return EmbeddedBoundary(solid, images, crossings)
@@ -168,7 +168,7 @@ def _overlay(
         solid, where = split.solid, where[split.kept]
         at = np.concatenate([at, where])
         images = np.concatenate([images, target.points(where)])
-        crossings = _core.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
+        crossings = _core.certificate.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
     return EmbeddedBoundary(solid, images, crossings)
 
 

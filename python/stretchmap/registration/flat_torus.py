@@ -60,13 +60,13 @@ class FlatSurface:
             As `conformal_map`.
         """
         conformal = conformal_map(surface)
-        chart = _core.SurfaceChart(surface.topology, conformal.forms)
-        sem = _core.SurfaceSem(chart, surface.face_areas, conformal.aspect, conformal.turns)
+        chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
+        sem = _core.area.SurfaceSem(chart, surface.face_areas, conformal.aspect, conformal.turns)
         shares = surface.face_areas / surface.area
         best, turns = math.inf, sem.turns
         for _ in range(_SEM_STEPS + 1):
             # Stretch energy does not mind a face that collapses, this measure does.
-            areas = _core.turn_areas(chart, np.ascontiguousarray(sem.turns))
+            areas = _core.area.turn_areas(chart, np.ascontiguousarray(sem.turns))
             ratio = np.maximum(areas / shares, 1e-300)
             value = float((shares * (ratio + 1.0 / ratio)).sum())
             if value < best:
@@ -90,13 +90,13 @@ class FlatSurface:
         return FlatSurface(self.surface, forms, np.ascontiguousarray(turns))
 
     @cached_property
-    def chart(self) -> _core.SurfaceChart:
+    def chart(self) -> _core.area.SurfaceChart:
         """Whole turns between the corners of each face (core object)."""
-        return _core.SurfaceChart(self.surface.topology, self.forms)
+        return _core.area.SurfaceChart(self.surface.topology, self.forms)
 
     @cached_property
-    def locator(self) -> _core.ChartLocator:
-        return _core.ChartLocator(self.chart, self.turns)
+    def locator(self) -> _core.registration.ChartLocator:
+        return _core.registration.ChartLocator(self.chart, self.turns)
 
     def locate(self, y: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Face and barycentric coordinates of points of the flat torus, (n, 2) in turns.
@@ -151,21 +151,21 @@ class FlatSurface:
 
 def _least_distorted(
     surface: TriMesh,
-    chart: _core.SurfaceChart,
+    chart: _core.area.SurfaceChart,
     lattice: NDArray[np.float64],
     turns: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Projected Newton steps on ``flat_value``; the start is returned if it is folded."""
     periods = np.ascontiguousarray(lattice.T / math.sqrt(abs(np.linalg.det(lattice))))
-    rest = _core.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
+    rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
     weights = surface.face_areas / surface.area
-    energy = _core.flat_value(chart, turns, periods, rest, weights)
+    energy = _core.registration.flat_value(chart, turns, periods, rest, weights)
     for _ in range(_FLAT_STEPS if math.isfinite(energy) else 0):
-        gradient, hessian = _core.flat_model(chart, turns, periods, rest, weights)
+        gradient, hessian = _core.registration.flat_model(chart, turns, periods, rest, weights)
         step, alpha = damped_solve(gradient, hessian).reshape(-1, 2), 1.0
         while alpha > _FLAT_SHORTEST:
             moved = turns + alpha * step
-            value = _core.flat_value(chart, moved, periods, rest, weights)
+            value = _core.registration.flat_value(chart, moved, periods, rest, weights)
             if value < energy:
                 break
             alpha *= 0.5
@@ -183,7 +183,7 @@ def damped_solve(gradient: NDArray[np.float64], hessian: sp.csr_matrix) -> NDArr
     diagonal = hessian.diagonal()
     matrix = (hessian + sp.diags(1e-6 * diagonal + 1e-12 * diagonal.mean())).tocsr()
     matrix.sort_indices()
-    solver = _core.SpdSolver(matrix, "direct")
+    solver = _core.linalg.SpdSolver(matrix, "direct")
     step, _ = solver.solve(-gradient[:, None], np.zeros((len(gradient), 1)), must_converge=False)
     return np.asarray(step[:, 0])
 

@@ -280,7 +280,7 @@ def _fill(
     n_split = source.n_vertices - n_given
     refinement = refine_boundary_joins(source)
     solid, ids = refinement.solid, source.boundary_vertices
-    enclosed = float(_core.enclosed_volume(points, source.surface.F))
+    enclosed = float(_core.mesh.enclosed_volume(points, source.surface.F))
     if not enclosed > 0.0:
         raise SolverError("the boundary image is inside out")
     length, centre = enclosed ** (1.0 / 3.0), points.mean(axis=0)

@@ -121,7 +121,9 @@ class SurfaceProblem:
     def __init__(self, source: FlatSurface, target: FlatSurface) -> None:
         surface = source.surface
         self.chart, self.target = source.chart, target
-        self.rest = _core.rest_triangles(surface.V, surface.F, target.surface.area / surface.area)
+        self.rest = _core.volume.rest_triangles(
+            surface.V, surface.F, target.surface.area / surface.area
+        )
         self.weights = surface.face_areas / surface.area
         self.held = np.zeros(surface.n_vertices, bool)
         self._edges = surface.edges
@@ -129,7 +131,7 @@ class SurfaceProblem:
 
     def place(self, y: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         points = self.target.points(y)
-        value = _core.match_value(self.chart, y, points, self.rest, self.weights)
+        value = _core.registration.match_value(self.chart, y, points, self.rest, self.weights)
         return points, value if math.isfinite(value) else math.inf
 
     def newton_step(
@@ -141,7 +143,7 @@ class SurfaceProblem:
     ) -> NDArray[np.float64]:
         """Step of all vertices; held ones move by ``wish`` (or not at all)."""
         slopes = self.target.slopes(y) if tangent else _NO_SLOPES
-        gradient, hessian = _core.match_model(
+        gradient, hessian = _core.registration.match_model(
             self.chart, y, points, slopes, self.rest, self.weights
         )
         free = np.flatnonzero(np.repeat(~self.held, 2))
@@ -162,7 +164,7 @@ class SurfaceProblem:
             total = np.bincount(ends, np.repeat(lengths, 2), minlength=len(y))
             self._reach = _REACH * total / np.bincount(ends, minlength=len(y))
         surface = self.target.surface
-        y, points, self._reach, _, _ = _core.relax_match(
+        y, points, self._reach, _, _ = _core.registration.relax_match(
             self.chart, self.target.locator, surface.V, surface.F, self.target.face_slopes,
             self.rest, self.weights, self.held.astype(np.uint8), _SWEEPS, y, points, self._reach,
         )  # fmt: skip

@@ -213,7 +213,7 @@ def hex_mesh(
         raise SolverError(f"{len(lost)} points of the grid lie outside the image", lost)
     V = pulled = located.points
     H = H.astype(np.int32)
-    if _core.tet_volumes(np.ascontiguousarray(grid), corner_tets(H)).sum() < 0.0:
+    if _core.mesh.tet_volumes(np.ascontiguousarray(grid), corner_tets(H)).sum() < 0.0:
         H = np.ascontiguousarray(H[:, [0, 3, 2, 1, 4, 7, 6, 5]])
     quality = jacobians(V, H)
     bad = int((~(quality > 0.0)).any(axis=1).sum())
@@ -277,9 +277,9 @@ def _repaired(
     edges = solid.surface.edges
     # Along an edge the angles change by less than half a turn; the rest is whole turns.
     forms = np.ascontiguousarray(-np.round(turns[edges[:, 1]] - turns[edges[:, 0]]).T, np.int32)
-    chart = _core.SurfaceChart(solid.surface.topology, forms)
+    chart = _core.area.SurfaceChart(solid.surface.topology, forms)
     at = np.ascontiguousarray(np.stack([u, v], axis=1) / TWO_PI)
-    faces, weights = _core.ChartLocator(chart, turns).locate(at)
+    faces, weights = _core.registration.ChartLocator(chart, turns).locate(at)
     shift = np.stack([surface.chart.shift_u, surface.chart.shift_v], axis=-1)
     y = np.einsum("bk,bkc->bc", weights, surface.turns[solid.surface.F[faces]] + shift[faces])
     # A coarse face may be turned over in plain angles; then the nearest vertex is near enough.

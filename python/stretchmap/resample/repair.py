@@ -88,10 +88,12 @@ class GridRepair:
         motion = np.zeros(len(self.V), np.uint8)
         motion[self.rim] = 1
         no_faces = (np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0))
-        newton = _core.SolidNewton(self._tets, rest, weights, motion, 2.0, 1.0, self.V, *no_faces)
-        worst = newton.value(self.V, _core.EnergyWeights(1.0, 1.0, 1.0)).min_det
+        newton = _core.volume.SolidNewton(
+            self._tets, rest, weights, motion, 2.0, 1.0, self.V, *no_faces
+        )
+        worst = newton.value(self.V, _core.volume.EnergyWeights(1.0, 1.0, 1.0)).min_det
         epsilon = float(np.clip(0.5 * abs(worst), _LEAST_EPSILON, _LARGEST_EPSILON))
-        energy = _core.EnergyWeights(1.0, _VOLUME_WEIGHT, epsilon)
+        energy = _core.volume.EnergyWeights(1.0, _VOLUME_WEIGHT, epsilon)
         for _ in range(_NEWTON_STEPS):
             self.V, _ = newton.step(self.V, energy, 0.1, 60)
         self._move(rest, epsilon, 0.0, 1.0, _SOFT_PULL, _UNTANGLE_SWEEPS)
@@ -120,9 +122,9 @@ class GridRepair:
         sweeps: int,
     ) -> None:
         surface = self.surface.surface
-        self.y, self.V, self._reach, _, _ = _core.relax_grid(
+        self.y, self.V, self._reach, _, _ = _core.resample.relax_grid(
             self._tets, rest, np.ones(len(rest)),
-            _core.EnergyWeights(1.0, _VOLUME_WEIGHT, epsilon), slack, power,
+            _core.volume.EnergyWeights(1.0, _VOLUME_WEIGHT, epsilon), slack, power,
             self._home, self._home_y, pull / self._mean_edge**2,
             self.surface.locator, surface.V, surface.F, self.surface.face_slopes,
             self.rim, sweeps, self.y, self.V, self._reach,

@@ -66,13 +66,15 @@ class FlipFreeSolver:
     history: list[IterationRecord] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        volumes = _core.signed_tet_volumes(self.V, self.T)
+        volumes = _core.volume.signed_tet_volumes(self.V, self.T)
         self._shares = volumes / volumes.sum()
-        self._rings = _core.ring_sums(self.T, self._shares, len(self.V))
-        self._rest = _core.rest_matrices(self.V, self.T, self.options.max_aspect)
-        self._minimiser: _core.SolidNewton | None = None  # of the last minimise, with its Hessian
+        self._rings = _core.measures.ring_sums(self.T, self._shares, len(self.V))
+        self._rest = _core.volume.rest_matrices(self.V, self.T, self.options.max_aspect)
+        self._minimiser: _core.volume.SolidNewton | None = (
+            None  # of the last minimise, with its Hessian
+        )
 
-    def _newton(self, x: NDArray[np.float64], boundary_motion: int) -> _core.SolidNewton:
+    def _newton(self, x: NDArray[np.float64], boundary_motion: int) -> _core.volume.SolidNewton:
         motion = np.full(len(self.V), _FREE, np.uint8)
         motion[self.boundary] = boundary_motion
         faces, face_rest, face_weights = _NO_FACES
@@ -83,8 +85,8 @@ class FlipFreeSolver:
             areas = 0.5 * np.linalg.norm(normals, axis=1)
             face_weights = areas / areas.sum()
             scale = 4.0 * math.pi**2 * self.R * self.r / areas.sum()
-            face_rest = _core.rest_triangles(self.V, faces, scale)
-        return _core.SolidNewton(
+            face_rest = _core.volume.rest_triangles(self.V, faces, scale)
+        return _core.volume.SolidNewton(
             self.T, self._rest, self._shares, motion, self.R, self.r, x, faces, face_rest,
             face_weights,
         )  # fmt: skip
@@ -100,7 +102,7 @@ class FlipFreeSolver:
         clock: float,
         total: int,
     ) -> None:
-        volumes = _core.signed_tet_volumes(x, self.T)
+        volumes = _core.volume.signed_tet_volumes(x, self.T)
         shares = volumes / volumes.sum()
         record = IterationRecord(
             stage=stage,
@@ -109,7 +111,9 @@ class FlipFreeSolver:
             step=step,
             residual=residual,
             flips=int(np.count_nonzero(~(volumes > 0.0))),
-            ring_sd=float((_core.ring_sums(self.T, shares, len(self.V)) / self._rings).std()),
+            ring_sd=float(
+                (_core.measures.ring_sums(self.T, shares, len(self.V)) / self._rings).std()
+            ),
             element_sd=float((shares / self._shares).std()),
             seconds=time.perf_counter() - clock,
         )
@@ -154,7 +158,7 @@ class FlipFreeSolver:
         face = o.face_weight if glide else 0.0
         newton = self._newton(x, _GLIDING if glide else _FIXED)
         clock = time.perf_counter()
-        state = newton.value(x, _core.EnergyWeights(1.0, 1.0, 1.0, face))
+        state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
         left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
         fewest, highest, since, restarts = left, worst, 0, 0
         epsilon = first = min(max(0.2 * abs(worst), 10.0 * o.floor), _WIDEST)
@@ -166,7 +170,7 @@ class FlipFreeSolver:
                 if not glide or restarts == _RESTARTS:
                     break
                 restarts, since, epsilon = restarts + 1, 0, max(first, 0.1)
-            weights = _core.EnergyWeights(1.0, 1.0, epsilon, face)
+            weights = _core.volume.EnergyWeights(1.0, 1.0, epsilon, face)
             x, step = newton.step(x, weights, min(o.cg_tol, 1e-2), o.max_cg)
             after = step.after
             self._record(
@@ -199,7 +203,7 @@ class FlipFreeSolver:
         clock = time.perf_counter()
         weight, kept = start, 0
         for iteration in range(1, total + 1):
-            weights = _core.EnergyWeights(1.0, weight, 0.0, face)
+            weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
             x, step = newton.step(x, weights, o.cg_tol, o.max_cg, kept > 0)
             before, after = step.before.energy / weight, step.after.energy / weight
             self._record(stage, iteration, x, after, step.alpha, step.decrement, clock, total)
@@ -236,9 +240,11 @@ class FlipFreeSolver:
         )
         newton = self._minimiser or self._newton(x, _GLIDING if glide else _FIXED)
         self._minimiser = None
-        weights = _core.EnergyWeights(1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0)
+        weights = _core.volume.EnergyWeights(
+            1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0
+        )
         clock, total = time.perf_counter(), o.target_iter + o.shift_iter
-        volumes = _core.signed_tet_volumes(x, self.T)
+        volumes = _core.volume.signed_tet_volumes(x, self.T)
         measured = marginals.measure(x)
         for iteration in range(total):
             if iteration < o.target_iter:
@@ -263,7 +269,7 @@ class FlipFreeSolver:
         """``moved``, but ``x`` at vertices of tets too far from ``volumes``; ``x`` has none."""
         stay = np.zeros(len(x), bool)
         while True:
-            ratios = _core.signed_tet_volumes(moved, self.T) / volumes
+            ratios = _core.volume.signed_tet_volumes(moved, self.T) / volumes
             harmed = ~((ratios > 1.0 - _GENTLE) & (ratios < 1.0 / (1.0 - _GENTLE)))
             if not harmed.any():
                 return moved
@@ -287,10 +293,10 @@ class FlipFreeSolver:
         """
         fixed = np.zeros(len(self.V), np.uint8)
         fixed[self.boundary] = 1
-        volumes = _core.signed_tet_volumes(x, self.T)
+        volumes = _core.volume.signed_tet_volumes(x, self.T)
         target = self._rings * volumes.sum()
         before = float((volumes / volumes.sum() / self._shares).std())
-        projection = _core.RingProjection(self.T, fixed)
+        projection = _core.volume.RingProjection(self.T, fixed)
         clock = time.perf_counter()
         moved = x
         for iteration in range(1, 11):

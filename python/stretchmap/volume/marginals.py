@@ -112,7 +112,9 @@ class Marginals:
             table += np.divide(
                 m.source - m.image, m.source, where=m.source > 0.0, out=np.zeros_like(table)
             )
-            targets += _core.level_lookup(self.T, m.values, table, m.period, m.period == TWO_PI)
+            targets += _core.volume.level_lookup(
+                self.T, m.values, table, m.period, m.period == TWO_PI
+            )
         return np.clip(targets, *_TARGETS)
 
     def shifted(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -151,7 +153,7 @@ class Marginals:
 
     def _amounts(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Shares of source and image volume (k, 2)."""
-        volumes = _core.signed_tet_volumes(x, self.T)
+        volumes = _core.volume.signed_tet_volumes(x, self.T)
         return np.column_stack([self.shares, volumes / volumes.sum()])
 
     def _histograms(
@@ -159,7 +161,9 @@ class Marginals:
     ) -> NDArray[np.float64]:
         """Source and image volume in the bins of one coordinate, each summing to 1: (2, bins)."""
         bins = self.multipliers.shape[1]
-        found = _core.level_histogram(self.T, values, amounts, bins, period, period == TWO_PI)
+        found = _core.volume.level_histogram(
+            self.T, values, amounts, bins, period, period == TWO_PI
+        )
         return np.ascontiguousarray(found.T)
 
     @staticmethod

@@ -59,7 +59,7 @@ def untangle_refining(
     x, left = solver.untangle(x, glide=glide, few=few)
     best = solver, refinement, x, left
     for _ in range(_ROUNDS):
-        inverted = np.flatnonzero(~(_core.signed_tet_volumes(x, solver.T) > 0.0))
+        inverted = np.flatnonzero(~(_core.volume.signed_tet_volumes(x, solver.T) > 0.0))
         if not 0 < len(inverted) <= _MOST_STUCK * len(solver.T):
             break
         n, passes = refinement.solid.n_vertices, len(refinement.halved)

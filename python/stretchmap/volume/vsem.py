@@ -91,15 +91,15 @@ def minimise_volumetric_stretch(
     VsemRun
     """
     clock = time.perf_counter()
-    rest = _core.signed_tet_volumes(V, T)
+    rest = _core.volume.signed_tet_volumes(V, T)
     shares = rest / rest.sum()
-    rings = _core.ring_sums(T, shares, len(V))
-    stretch = _core.VolumetricStretch(T, fixed, rest, solver)
+    rings = _core.measures.ring_sums(T, shares, len(V))
+    stretch = _core.volume.VolumetricStretch(T, fixed, rest, solver)
     history: list[IterationRecord] = []
 
     def record(x: NDArray[np.float64], iteration: int, residual: float) -> float:
-        volumes = _core.signed_tet_volumes(x, T)
-        energy = float(_core.tet_stretch_energy(volumes, rest))
+        volumes = _core.volume.signed_tet_volumes(x, T)
+        energy = float(_core.volume.tet_stretch_energy(volumes, rest))
         image_shares = volumes / volumes.sum()
         history.append(
             IterationRecord(
@@ -108,7 +108,7 @@ def minimise_volumetric_stretch(
                 energy=energy,
                 residual=residual,
                 flips=int(np.count_nonzero(~(volumes > 0.0))),
-                ring_sd=float((_core.ring_sums(T, image_shares, len(V)) / rings).std()),
+                ring_sd=float((_core.measures.ring_sums(T, image_shares, len(V)) / rings).std()),
                 element_sd=float((image_shares / shares).std()),
                 seconds=time.perf_counter() - clock,
             )

@@ -22,7 +22,7 @@ def torus_grid(nu: int, nv: int, ratio: float, seed: int | None = None) -> TriMe
     """Torus of revolution sampled evenly in the equal-area coordinates (u, s)."""
     i, j = np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij")
     u, s = TWO_PI * i.ravel() / nu, TWO_PI * j.ravel() / nv
-    v = _core.angle_from_equal_area(s, 1.0 / ratio)
+    v = _core.area.angle_from_equal_area(s, 1.0 / ratio)
     points = stretchmap.Torus(ratio, 1.0).xi(u, v)
     a, b = i.ravel() * nv + j.ravel(), ((i.ravel() + 1) % nu) * nv + j.ravel()
     c = ((i.ravel() + 1) % nu) * nv + (j.ravel() + 1) % nv
@@ -46,8 +46,8 @@ def bumpy() -> TriMesh:
 
 
 @pytest.fixture(scope="module")
-def chart(bumpy: TriMesh) -> _core.SurfaceChart:
-    return _core.SurfaceChart(bumpy.topology, conformal_map(bumpy).forms)
+def chart(bumpy: TriMesh) -> _core.area.SurfaceChart:
+    return _core.area.SurfaceChart(bumpy.topology, conformal_map(bumpy).forms)
 
 
 @pytest.fixture(scope="module")
@@ -78,19 +78,19 @@ def cotangent_stretch_laplacian(mesh: TriMesh, image: np.ndarray) -> np.ndarray:
 
 def test_stretch_laplacian_is_the_printed_one(bumpy: TriMesh) -> None:
     image = bumpy.V @ np.diag([1.0, 0.7, 1.3])
-    ours = _core.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image).toarray()
+    ours = _core.testing.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image).toarray()
     np.testing.assert_allclose(ours, cotangent_stretch_laplacian(bumpy, image), atol=1e-12)
 
 
 def test_stretch_energy_identities(bumpy: TriMesh) -> None:
     image = bumpy.V @ np.diag([1.0, 0.7, 1.3])
-    L = _core.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image)
-    energy = _core.surface_stretch_energy(bumpy.F, bumpy.face_areas, image)
+    L = _core.testing.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image)
+    energy = _core.testing.surface_stretch_energy(bumpy.F, bumpy.face_areas, image)
     areas = TriMesh(image, bumpy.F).face_areas
     assert energy == pytest.approx(0.5 * np.trace(image.T @ (L @ image)), rel=1e-13)
     assert energy == pytest.approx((areas**2 / bumpy.face_areas).sum(), rel=1e-13)
     assert energy > areas.sum() ** 2 / bumpy.area
-    similar = _core.surface_stretch_energy(bumpy.F, bumpy.face_areas, 3.0 * bumpy.V)
+    similar = _core.testing.surface_stretch_energy(bumpy.F, bumpy.face_areas, 3.0 * bumpy.V)
     assert similar == pytest.approx(81.0 * bumpy.area, rel=1e-13)
 
 
@@ -100,15 +100,19 @@ def test_stretch_gradient_by_differences(bumpy: TriMesh) -> None:
     image, h = bumpy.V @ np.diag([1.0, 0.7, 1.3]), 1e-5
 
     def energy(t: float) -> float:
-        return _core.surface_stretch_energy(bumpy.F, bumpy.face_areas, image + t * direction)
+        return _core.testing.surface_stretch_energy(
+            bumpy.F, bumpy.face_areas, image + t * direction
+        )
 
-    gradient = 2.0 * _core.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image) @ image
+    gradient = (
+        2.0 * _core.testing.surface_stretch_laplacian(bumpy.F, bumpy.face_areas, image) @ image
+    )
     numeric = (energy(h) - energy(-h)) / (2.0 * h)
     assert (gradient * direction).sum() == pytest.approx(numeric, rel=1e-7)
 
 
 def test_chart_energy_and_gradient(
-    bumpy: TriMesh, chart: _core.SurfaceChart, turns: np.ndarray
+    bumpy: TriMesh, chart: _core.area.SurfaceChart, turns: np.ndarray
 ) -> None:
     periods = np.array([1.6, 0.9])
     areas = bumpy.face_areas
@@ -116,18 +120,18 @@ def test_chart_energy_and_gradient(
     direction, h = rng.normal(size=turns.shape), 1e-6
 
     def energy(t: float) -> float:
-        return _core.chart_stretch_energy(chart, areas, periods, turns + t * direction)
+        return _core.testing.chart_stretch_energy(chart, areas, periods, turns + t * direction)
 
-    half = _core.chart_stretch_product(chart, areas, periods, turns, turns) * periods
+    half = _core.testing.chart_stretch_product(chart, areas, periods, turns, turns) * periods
     numeric = (energy(h) - energy(-h)) / (2.0 * h)
     assert 2.0 * (half * direction * periods).sum() == pytest.approx(numeric, rel=1e-6)
-    signed = _core.turn_areas(chart, turns) * periods.prod()
+    signed = _core.area.turn_areas(chart, turns) * periods.prod()
     assert energy(0.0) == pytest.approx((signed**2 / areas).sum(), rel=1e-12)
     assert signed.sum() == pytest.approx(periods.prod(), rel=1e-12)
-    laplacian = _core.chart_stretch_laplacian(chart, areas, periods, turns)
+    laplacian = _core.testing.chart_stretch_laplacian(chart, areas, periods, turns)
     np.testing.assert_allclose(laplacian @ np.ones(len(turns)), 0.0, atol=1e-12)
-    moved = _core.chart_stretch_product(chart, areas, periods, turns, turns + direction)
-    before = _core.chart_stretch_product(chart, areas, periods, turns, turns)
+    moved = _core.testing.chart_stretch_product(chart, areas, periods, turns, turns + direction)
+    before = _core.testing.chart_stretch_product(chart, areas, periods, turns, turns)
     np.testing.assert_allclose(moved - before, laplacian @ direction, atol=1e-10)
 
 
@@ -137,9 +141,9 @@ def test_chart_energy_and_gradient(
 @pytest.mark.parametrize("tube_ratio", [0.0, 0.3, 0.95, 0.9999])
 def test_equal_area_coordinate_and_its_inverse(tube_ratio: float) -> None:
     s = np.concatenate([np.linspace(-20.0, 20.0, 2001), np.pi * np.arange(-5, 6)])
-    v = _core.angle_from_equal_area(s, tube_ratio)
+    v = _core.area.angle_from_equal_area(s, tube_ratio)
     np.testing.assert_allclose(v + tube_ratio * np.sin(v), s, atol=1e-13)
-    np.testing.assert_allclose(_core.equal_area_from_angle(v, tube_ratio), s, atol=1e-13)
+    np.testing.assert_allclose(_core.testing.equal_area_from_angle(v, tube_ratio), s, atol=1e-13)
     assert np.abs(v - s).max() <= tube_ratio + 1e-12
 
 
@@ -147,7 +151,7 @@ def test_open_forms_are_refused(bumpy: TriMesh) -> None:
     forms = conformal_map(bumpy).forms.copy()
     forms[0, 0] += 1
     with pytest.raises(SolverError, match="not closed") as caught:
-        _core.SurfaceChart(bumpy.topology, forms)
+        _core.area.SurfaceChart(bumpy.topology, forms)
     assert len(caught.value.ids) == 2
 
 
@@ -155,24 +159,26 @@ def test_open_forms_are_refused(bumpy: TriMesh) -> None:
 
 
 @pytest.fixture(scope="module")
-def glide(bumpy: TriMesh, chart: _core.SurfaceChart) -> tuple[_core.GlideProblem, np.ndarray]:
+def glide(
+    bumpy: TriMesh, chart: _core.area.SurfaceChart
+) -> tuple[_core.area.GlideProblem, np.ndarray]:
     rng = np.random.default_rng(2)
     result = area_map(bumpy, finish="none", sem_iter=2)
-    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
+    reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
     angles = result.angles + 5e-3 * rng.normal(size=result.angles.shape)
-    return _core.GlideProblem(chart, reference, result.ratio), angles
+    return _core.area.GlideProblem(chart, reference, result.ratio), angles
 
 
 @pytest.mark.parametrize("weights", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
 def test_finishing_derivatives_by_differences(
-    glide: tuple[_core.GlideProblem, np.ndarray], weights: tuple[float, float, float]
+    glide: tuple[_core.area.GlideProblem, np.ndarray], weights: tuple[float, float, float]
 ) -> None:
     problem, angles = glide
     direction = np.random.default_rng(3).normal(size=angles.shape)
     h = 1e-5
 
     def at(t: float) -> tuple[float, np.ndarray, object]:
-        return _core.glide_energy(problem, *weights, 1.1, angles + t * direction)
+        return _core.testing.glide_energy(problem, *weights, 1.1, angles + t * direction)
 
     _, gradient, hessian = at(0.0)
     (plus, gradient_plus, _), (minus, gradient_minus, _) = at(h), at(-h)
@@ -183,56 +189,58 @@ def test_finishing_derivatives_by_differences(
     )
 
 
-def test_facing_gradient_by_differences(bumpy: TriMesh, chart: _core.SurfaceChart) -> None:
+def test_facing_gradient_by_differences(bumpy: TriMesh, chart: _core.area.SurfaceChart) -> None:
     result = area_map(bumpy, finish="none", sem_iter=2)
-    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
-    problem = _core.GlideProblem(chart, reference, result.ratio, facing=True)
-    plain = _core.GlideProblem(chart, reference, result.ratio)
+    reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
+    problem = _core.area.GlideProblem(chart, reference, result.ratio, facing=True)
+    plain = _core.area.GlideProblem(chart, reference, result.ratio)
     angles = np.array(result.angles)
     direction = np.random.default_rng(5).normal(size=angles.shape)
     h = 1e-6
 
     def at(t: float) -> tuple[float, np.ndarray, object]:
-        return _core.glide_energy(problem, 0.0, 0.0, 1.0, 1.0, angles + t * direction)
+        return _core.testing.glide_energy(problem, 0.0, 0.0, 1.0, 1.0, angles + t * direction)
 
     slope = (at(h)[0] - at(-h)[0]) / (2 * h)
     assert at(0.0)[1] @ direction.ravel() == pytest.approx(slope, rel=1e-6)
-    assert at(0.0)[0] > _core.glide_energy(plain, 0.0, 0.0, 1.0, 1.0, angles)[0]
+    assert at(0.0)[0] > _core.testing.glide_energy(plain, 0.0, 0.0, 1.0, 1.0, angles)[0]
 
 
 def test_model_is_convex_and_bounded_by_nothing_but_convexity(
-    glide: tuple[_core.GlideProblem, np.ndarray],
+    glide: tuple[_core.area.GlideProblem, np.ndarray],
 ) -> None:
     problem, angles = glide
-    value, gradient, _ = _core.glide_energy(problem, 1.0, 0.1, 1.0, 1.0, angles)
-    same, same_gradient, model = _core.glide_energy(problem, 1.0, 0.1, 1.0, 1.0, angles, True)
+    value, gradient, _ = _core.testing.glide_energy(problem, 1.0, 0.1, 1.0, 1.0, angles)
+    same, same_gradient, model = _core.testing.glide_energy(
+        problem, 1.0, 0.1, 1.0, 1.0, angles, True
+    )
     assert same == value
     np.testing.assert_array_equal(same_gradient, gradient)
     assert np.linalg.eigvalsh(model.toarray()).min() > -1e-10 * abs(model).max()
 
 
 def test_finishing_energy_against_a_second_computation(
-    bumpy: TriMesh, glide: tuple[_core.GlideProblem, np.ndarray]
+    bumpy: TriMesh, glide: tuple[_core.area.GlideProblem, np.ndarray]
 ) -> None:
     problem, angles = glide
-    scale = _core.best_scale(problem, angles)
+    scale = _core.testing.best_scale(problem, angles)
     ratio = area_map(bumpy, finish="none", sem_iter=0).ratio
     torus = stretchmap.Torus.from_ratio(ratio, area=1.0)
     image = torus.xi(angles[:, 0], angles[:, 1])
     shares = bumpy.face_areas / bumpy.area
     areas = TriMesh(image, bumpy.F).face_areas
-    np.testing.assert_allclose(_core.glide_areas(problem, angles), areas, rtol=1e-12)
+    np.testing.assert_allclose(_core.testing.glide_areas(problem, angles), areas, rtol=1e-12)
     rho = areas / shares / scale
-    value = _core.glide_energy(problem, 1.0, 0.0, 0.0, scale, angles)[0]
+    value = _core.testing.glide_energy(problem, 1.0, 0.0, 0.0, scale, angles)[0]
     assert value == pytest.approx((shares * (rho + 1.0 / rho - 2.0)).sum(), rel=1e-10)
     for other in (0.99 * scale, 1.01 * scale):
-        assert _core.glide_energy(problem, 1.0, 0.0, 0.0, other, angles)[0] > value
+        assert _core.testing.glide_energy(problem, 1.0, 0.0, 0.0, other, angles)[0] > value
     jacobians = []
     for face in bumpy.F:
         p, q = bumpy.V[face], image[face]
         jacobians.append(_singular_values(p, q))
     s1, s2 = np.array(jacobians).T
-    value = _core.glide_energy(problem, 0.0, 1.0, 0.0, scale, angles)[0]
+    value = _core.testing.glide_energy(problem, 0.0, 1.0, 0.0, scale, angles)[0]
     assert value == pytest.approx((shares * (0.5 * (s1 / s2 + s2 / s1) - 1.0)).sum(), rel=1e-9)
 
 
@@ -272,7 +280,7 @@ def _block_system(block: int, quasi: bool) -> sparse.csr_matrix:
 def test_block_factor_against_scipy(block: int, quasi: bool) -> None:
     matrix = _block_system(block, quasi)
     right = np.random.default_rng(9).normal(size=matrix.shape[0])
-    solve = _core.block_ldlt_solve_2 if block == 2 else _core.block_ldlt_solve_3
+    solve = _core.testing.block_ldlt_solve_2 if block == 2 else _core.testing.block_ldlt_solve_3
     expected = sparse.linalg.spsolve(matrix.tocsc(), right)
     np.testing.assert_allclose(solve(matrix, right), expected, atol=1e-8 * abs(expected).max())
 
@@ -281,31 +289,31 @@ def test_singular_pivot_is_an_error() -> None:
     matrix = _block_system(2, False)
     matrix.data[:] = 0.0
     with pytest.raises(SolverError, match="pivot"):
-        _core.block_ldlt_solve_2(matrix, np.ones(matrix.shape[0]))
+        _core.testing.block_ldlt_solve_2(matrix, np.ones(matrix.shape[0]))
 
 
 def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
     conformal = conformal_map(bumpy)
-    reference = _core.SurfaceReference(bumpy.V, bumpy.F)
+    reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
     candidates = np.array([[0.0, 1.5], [0.3, 2.2], [-0.45, 5.0]])
-    rated = _core.phase_qualities(reference, bumpy.F, conformal.turns, candidates)
+    rated = _core.area.phase_qualities(reference, bumpy.F, conformal.turns, candidates)
     for (phase, ratio), quality in zip(candidates, rated, strict=True):
-        image = _core.torus_image(conformal.turns, phase, ratio)
-        exact = _core.surface_quality(reference, bumpy.F, image)
+        image = _core.testing.torus_image(conformal.turns, phase, ratio)
+        exact = _core.testing.surface_quality(reference, bumpy.F, image)
         assert quality.energy == pytest.approx(exact.energy, rel=1e-4)
         assert quality.angle_mean == pytest.approx(exact.angle_mean, rel=1e-4)
-    similar = _core.surface_quality(reference, bumpy.F, 2.0 * bumpy.V)
+    similar = _core.testing.surface_quality(reference, bumpy.F, 2.0 * bumpy.V)
     assert similar.energy == pytest.approx(1.0, abs=1e-12)
     assert similar.angle_max == pytest.approx(1.0, abs=1e-7)
     assert similar.face_sd < 1e-12
 
 
 def test_newton_refuses_a_start_with_flips(
-    glide: tuple[_core.GlideProblem, np.ndarray],
+    glide: tuple[_core.area.GlideProblem, np.ndarray],
 ) -> None:
     problem, angles = glide
     with pytest.raises(SolverError, match="flipped") as caught:
-        _core.SurfaceNewton(problem, angles[:, ::-1].copy())
+        _core.area.SurfaceNewton(problem, angles[:, ::-1].copy())
     assert len(caught.value.ids) > 0
 
 
@@ -315,11 +323,11 @@ def test_newton_refuses_a_start_with_flips(
 def test_equal_area_torus_is_a_fixed_point() -> None:
     ratio = 2.5
     mesh = torus_grid(60, 36, ratio, seed=3)
-    chart = _core.SurfaceChart(mesh.topology, conformal_map(mesh).forms)
+    chart = _core.area.SurfaceChart(mesh.topology, conformal_map(mesh).forms)
     u, v, _ = stretchmap.Torus(ratio, 1.0).coordinates(mesh.V)
-    s = _core.equal_area_from_angle(v, 1.0 / ratio)
+    s = _core.testing.equal_area_from_angle(v, 1.0 / ratio)
     turns = _lift(mesh, chart, np.column_stack([u, s]) / TWO_PI)
-    sem = _core.SurfaceSem(chart, np.full(len(mesh.F), 1.0), ratio, turns)
+    sem = _core.area.SurfaceSem(chart, np.full(len(mesh.F), 1.0), ratio, turns)
     start = sem.figures()
     assert start.energy == pytest.approx(1.0, abs=1e-12)
     assert start.ring_sd < 1e-12
@@ -327,7 +335,7 @@ def test_equal_area_torus_is_a_fixed_point() -> None:
     np.testing.assert_allclose(sem.turns - sem.turns[0], turns - turns[0], atol=1e-9)
 
 
-def _lift(mesh: TriMesh, chart: _core.SurfaceChart, turns: np.ndarray) -> np.ndarray:
+def _lift(mesh: TriMesh, chart: _core.area.SurfaceChart, turns: np.ndarray) -> np.ndarray:
     """Whole turns added so that the corners of every face fit together under the chart's shifts."""
     shift = np.stack([chart.shift_u, chart.shift_v], axis=2)
     lifted, seen, stack = turns.copy(), np.zeros(len(turns), bool), [0]
@@ -403,7 +411,7 @@ def test_invariant_under_renumbering(bumpy: TriMesh) -> None:
     # The origin of v and the common sign of u and v belong to the numbering: bring them along.
     start = area_map(bumpy, finish="none", phase=0.1).angles[order, 1]
     first = area_map(other, finish="none", phase=0.0).angles[:, 1]
-    s_a, s_b = (_core.equal_area_from_angle(v, 1.0 / a.ratio) for v in (start, first))
+    s_a, s_b = (_core.testing.equal_area_from_angle(v, 1.0 / a.ratio) for v in (start, first))
     shift = min(
         (np.angle(np.exp(1j * (sign * s_a - s_b))) for sign in (1.0, -1.0)),
         key=lambda x: np.abs(np.exp(1j * x) - np.exp(1j * x[0])).max(),
@@ -448,8 +456,8 @@ def test_start_with_flips_is_replaced(bumpy: TriMesh) -> None:
     conformal = conformal_map(bumpy)
     rng = np.random.default_rng(4)
     broken = conformal.turns + 0.1 * rng.normal(size=conformal.turns.shape)
-    chart = _core.SurfaceChart(bumpy.topology, conformal.forms)
-    assert (_core.turn_areas(chart, broken) <= 0.0).any()
+    chart = _core.area.SurfaceChart(bumpy.topology, conformal.forms)
+    assert (_core.area.turn_areas(chart, broken) <= 0.0).any()
     result = area_map(bumpy, conformal=dataclasses.replace(conformal, turns=broken))
     assert result.history[0].flips == 0
     assert result.distortion.flips == 0

@@ -30,29 +30,29 @@ def test_maps_are_the_same_to_the_last_bit(solid, options):
 
 
 def test_the_number_is_put_back(solid):
-    before = _core.thread_count()
+    before = _core.base.thread_count()
     with sm.threads(before + 1):
-        assert _core.thread_count() == before + 1
+        assert _core.base.thread_count() == before + 1
         with sm.threads(None):
-            assert _core.thread_count() == before + 1
+            assert _core.base.thread_count() == before + 1
         with pytest.raises(errors.OptionError):
             sm.area_map(solid.surface, threads=before + 2, max_iter=-1)
-        assert _core.thread_count() == before + 1
-    assert _core.thread_count() == before
+        assert _core.base.thread_count() == before + 1
+    assert _core.base.thread_count() == before
 
 
 def test_map_functions_set_it_while_they_run():
     seen = []
     surface = samples.bumpy_torus(2000).surface
-    sm.area_map(surface, threads=3, progress=lambda *a, **k: seen.append(_core.thread_count()))
+    sm.area_map(surface, threads=3, progress=lambda *a, **k: seen.append(_core.base.thread_count()))
     assert set(seen) == {3}
 
 
 def test_other_python_threads_keep_theirs():
     seen = []
-    before = _core.thread_count()
+    before = _core.base.thread_count()
     with sm.threads(before + 1):
-        worker = threading.Thread(target=lambda: seen.append(_core.thread_count()))
+        worker = threading.Thread(target=lambda: seen.append(_core.base.thread_count()))
         worker.start()
         worker.join()
     assert seen == [before]

@@ -37,7 +37,7 @@ def solid():
 def test_orient3d_is_exact_next_to_degenerate(base, ulps, scale):
     points = (np.array(base, float) + 1 / 3).reshape(4, 3) * scale
     points += np.spacing(points) * np.reshape(ulps, (4, 3))
-    assert _core.orient3d(*points) == ref.exact_orient3d(*points)
+    assert _core.testing.orient3d(*points) == ref.exact_orient3d(*points)
 
 
 @settings(max_examples=200, deadline=None)
@@ -51,13 +51,13 @@ def test_orient2d_is_exact_next_to_degenerate(base, ulps, axis):
     points += np.spacing(points) * np.reshape(ulps, (3, 3))
     lifted = np.insert(np.delete(points, axis, axis=1), 2, 0.0, axis=1)
     above = lifted[0] + [0.0, 0.0, 1.0]
-    assert _core.orient2d(*points, axis) == ref.exact_orient3d(*lifted, above)
+    assert _core.testing.orient2d(*points, axis) == ref.exact_orient3d(*lifted, above)
 
 
 def test_predicates_answer_zero_rather_than_guess_out_of_range():
     tiny = np.array([[0, 0, 0], [1e-200, 0, 0], [0, 1e-200, 0], [0, 0, 1e-200]])
-    assert _core.orient3d(*tiny) == 0
-    assert _core.orient3d(*tiny * 1e190) == 1
+    assert _core.testing.orient3d(*tiny) == 0
+    assert _core.testing.orient3d(*tiny * 1e190) == 1
 
 
 def meets_by_linear_program(V, a, b):
@@ -85,7 +85,7 @@ def test_triangle_pairs_against_linear_programming(shared):
         areas = [np.linalg.norm(np.cross(V[f[1]] - V[f[0]], V[f[2]] - V[f[0]])) for f in (a, b)]
         if min(areas) == 0 or len(np.unique(V, axis=0)) < len(V):
             continue
-        found = len(_core.crossing_faces(V, np.array([a, b], np.int32), 10)) > 0
+        found = len(_core.certificate.crossing_faces(V, np.array([a, b], np.int32), 10)) > 0
         assert found == meets_by_linear_program(V, a, b), (V, a, b)
         seen[found] += 1
     assert min(seen.values()) > 10
@@ -95,12 +95,12 @@ def test_crossings_do_not_depend_on_the_search_tree():
     rng = np.random.default_rng(5)
     V = rng.uniform(0, 1, (300, 3))
     F = rng.permutation(300).reshape(100, 3).astype(np.int32)
-    pairs = {tuple(pair) for pair in _core.crossing_faces(V, F, 10_000)}
+    pairs = {tuple(pair) for pair in _core.certificate.crossing_faces(V, F, 10_000)}
     brute = {
         (i, j)
         for i in range(100)
         for j in range(i + 1, 100)
-        if len(_core.crossing_faces(V, F[[i, j]], 1))
+        if len(_core.certificate.crossing_faces(V, F[[i, j]], 1))
     }
     assert pairs == brute and len(brute) > 20
 

@@ -76,7 +76,7 @@ def test_flat_torus_is_exact(first, second):
         a, b = e[:, (k + 1) % 3], e[:, (k + 2) % 3]
         cotangent = -(a * b).sum(axis=1) / np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
         np.add.at(weights, surface.topology.edge.reshape(-1, 3)[:, k], 0.5 * cotangent)
-    forms, _, gram = _core.harmonic_forms(surface.n_vertices, surface.edges, weights, winding)
+    forms, _, gram = _core.forms.harmonic_forms(surface.n_vertices, surface.edges, weights, winding)
     periods = np.array([first, second])
     assert np.allclose(forms.T @ periods, vectors, atol=1e-13)
     # The closed form: sqrt(det G) G^-1 is the Gram matrix of the periods over their area.

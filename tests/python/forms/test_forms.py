@@ -53,8 +53,8 @@ def divergence(surface, weights, form):
 def test_laplacian_is_that_of_libigl():
     igl = pytest.importorskip("igl")
     for surface in (random_torus(), plate()):
-        weights = _core.cotangent_weights(surface.topology, surface.V)
-        ours = _core.weighted_laplacian(surface.topology, weights)
+        weights = _core.forms.cotangent_weights(surface.topology, surface.V)
+        ours = _core.testing.weighted_laplacian(surface.topology, weights)
         theirs = -igl.cotmatrix(surface.V, surface.F)
         assert abs(ours - theirs).max() < 1e-12 * abs(theirs).max()
 
@@ -69,7 +69,9 @@ def test_weights_are_half_the_cotangents():
             a, b = surface.V[i] - surface.V[apex], surface.V[j] - surface.V[apex]
             angle = np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))
             expected[lookup[min(i, j), max(i, j)]] += 0.5 / np.tan(angle)
-    assert np.allclose(_core.cotangent_weights(surface.topology, surface.V), expected, rtol=1e-9)
+    assert np.allclose(
+        _core.forms.cotangent_weights(surface.topology, surface.V), expected, rtol=1e-9
+    )
 
 
 def test_a_face_without_area_is_named():
@@ -77,7 +79,7 @@ def test_a_face_without_area_is_named():
     points[faces[5, 2]] = points[faces[5, 1]]
     surface = TriMesh(points, faces)
     with pytest.raises(DegenerateError) as caught:
-        _core.cotangent_weights(surface.topology, surface.V)
+        _core.forms.cotangent_weights(surface.topology, surface.V)
     assert 5 in caught.value.ids
 
 
@@ -88,7 +90,7 @@ def test_a_face_without_area_is_named():
 def test_harmonic_forms_are_closed_coclosed_and_keep_their_periods(surface):
     basis = homology_basis(surface)
     harmonic = harmonic_forms(surface, basis)
-    weights = _core.cotangent_weights(surface.topology, surface.V)
+    weights = _core.forms.cotangent_weights(surface.topology, surface.V)
     assert harmonic.forms.shape == (2 * basis.genus, len(surface.edges))
     assert not harmonic.potentials[0].any()
     i, j = surface.edges.T
@@ -114,7 +116,7 @@ def edge_id(surface, a, b):
 def test_harmonic_forms_have_least_energy_in_their_class():
     surface = random_torus(5)
     harmonic = harmonic_forms(surface)
-    weights = _core.cotangent_weights(surface.topology, surface.V)
+    weights = _core.forms.cotangent_weights(surface.topology, surface.V)
     i, j = surface.edges.T
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -129,7 +131,7 @@ def test_harmonic_forms_have_least_energy_in_their_class():
 def test_vector_proxies_return_the_form_and_star_is_a_quarter_turn():
     surface = random_torus(2)
     form = harmonic_forms(surface).forms[1]
-    vectors = _core.form_vectors(surface.topology, surface.V, form)
+    vectors = _core.testing.form_vectors(surface.topology, surface.V, form)
     corners = surface.V[surface.F]
     edges = np.roll(corners, -1, axis=1) - corners
     assert np.allclose(np.einsum("fd,fkd->fk", vectors, edges), along(surface, form), atol=1e-13)
@@ -143,9 +145,11 @@ def test_both_ways_to_the_products_agree(surface):
     basis = homology_basis(surface)
     forms = holomorphic_forms(surface, basis)
     assert np.allclose(forms.star, basis.harmonic.gram, rtol=1e-10, atol=1e-12)
-    wedge = _core.wedge_matrix(surface.topology, basis.dual_forms.astype(float))
+    wedge = _core.homology.wedge_matrix(surface.topology, basis.dual_forms.astype(float))
     assert np.allclose(forms.wedge, wedge, atol=1e-11)
-    areas = _core.chart_areas(surface.topology, basis.harmonic.forms[0], basis.harmonic.forms[1])
+    areas = _core.forms.chart_areas(
+        surface.topology, basis.harmonic.forms[0], basis.harmonic.forms[1]
+    )
     assert areas.sum() == pytest.approx(wedge[0, 1], abs=1e-11)
 
 
@@ -165,7 +169,7 @@ def test_holomorphic_basis_at_genus_two():
         mu = forms.coefficients
         assert mu.shape == (4, 4)
         errors.append(np.abs(mu @ mu + np.eye(4)).max())
-        weights = _core.cotangent_weights(surface.topology, surface.V)
+        weights = _core.forms.cotangent_weights(surface.topology, surface.V)
         for real, imag in zip(forms.real, forms.imag, strict=True):
             for form in (real, imag):
                 assert np.abs(along(surface, form).sum(axis=1)).max() < 1e-11
@@ -201,9 +205,9 @@ def test_genus_zero_has_no_forms():
 def test_intrinsic_delaunay_keeps_the_surface():
     surface = random_torus(7, 24, 10)
     basis = homology_basis(surface)
-    lengths = _core.edge_lengths(surface.topology, surface.V)
-    weights = _core.cotangent_weights(surface.topology, surface.V)
-    edges, flipped, eta, n_flips = _core.intrinsic_delaunay(
+    lengths = _core.mesh.edge_lengths(surface.topology, surface.V)
+    weights = _core.forms.cotangent_weights(surface.topology, surface.V)
+    edges, flipped, eta, n_flips = _core.forms.intrinsic_delaunay(
         surface.topology, lengths, basis.dual_forms
     )
     assert n_flips >= (weights < 0).sum() > 0
@@ -246,7 +250,7 @@ def test_no_flips_on_a_delaunay_surface():
 def test_clamped_weights_are_solved_for():
     surface = random_torus(7, 24, 10)
     clamped = harmonic_forms(surface, weights="clamped")
-    weights = np.maximum(_core.cotangent_weights(surface.topology, surface.V), CLAMP)
+    weights = np.maximum(_core.forms.cotangent_weights(surface.topology, surface.V), CLAMP)
     assert np.abs(divergence(surface, weights, clamped.forms[0])).max() < 1e-12
     with pytest.raises(OptionError, match="weights must be one of"):
         harmonic_forms(surface, weights="uniform")

@@ -18,7 +18,7 @@ from stretchmap.errors import MissingDependencyError, OptionError, SolverError
 
 BACKENDS = ["direct", "multigrid", "jacobi"]
 try:
-    _core.SpdSolver(sp.identity(1, format="csr"), "cholmod")
+    _core.linalg.SpdSolver(sp.identity(1, format="csr"), "cholmod")
     BACKENDS.append("cholmod")
 except MissingDependencyError:
     pass
@@ -120,11 +120,11 @@ def assemble_blocks(local, tets, n, missing, frames=None):
 
 def block_solver(blocks, modes=None, preconditioner="multigrid"):
     n = blocks.shape[0] // 3
-    return _core.BlockSolver(
+    return _core.testing.BlockSolver(
         blocks.indptr.astype(np.int32),
         blocks.indices.astype(np.int32),
         blocks.data.ravel().copy(),
-        np.ascontiguousarray(_core.translations(n) if modes is None else modes),
+        np.ascontiguousarray(_core.testing.translations(n) if modes is None else modes),
         preconditioner,
     )
 
@@ -164,7 +164,7 @@ def test_poisson_on_a_line_is_exact_at_the_nodes(backend):
     """-u'' = 1 with u(0) = u(1) = 0: the P1 solution is x (1 - x) / 2 at the nodes."""
     n, h = 99, 0.01
     matrix = sp.diags([-1 / h, 2 / h, -1 / h], [-1, 0, 1], (n, n), format="csr")
-    solver = _core.SpdSolver(matrix, backend)
+    solver = _core.linalg.SpdSolver(matrix, backend)
     x, report = solver.solve(np.full((n, 1), h), np.zeros((n, 1)), 1e-12)
     nodes = h * np.arange(1, n + 1)
     assert solver.backend == backend
@@ -178,7 +178,7 @@ def test_harmonic_extension_of_a_linear_function_is_linear(backend, solid):
     matrix = laplacian(points, tets)
     outer = np.setdiff1d(np.arange(len(points)), inner)
     rhs = -(matrix[inner][:, outer] @ points[outer])
-    x, report = _core.SpdSolver(restrict(matrix, inner), backend).solve(
+    x, report = _core.linalg.SpdSolver(restrict(matrix, inner), backend).solve(
         rhs, np.zeros_like(rhs), 1e-11
     )
     np.testing.assert_allclose(x, points[inner], atol=1e-9)
@@ -195,7 +195,7 @@ def test_stretched_weights_agree_with_a_factorisation(backend, noise, solid):
     assert (off_diagonal.data > 0).mean() > 0.1
     assert matrix.diagonal().max() > 1e4 * matrix.diagonal().min()
     rhs = np.random.default_rng(1).standard_normal((len(inner), 3))
-    x, report = _core.SpdSolver(matrix, backend).solve(rhs, np.zeros_like(rhs), 1e-11, 5000)
+    x, report = _core.linalg.SpdSolver(matrix, backend).solve(rhs, np.zeros_like(rhs), 1e-11, 5000)
     expected = splu(matrix.tocsc()).solve(rhs)
     assert np.linalg.norm(x - expected) < 1e-7 * np.linalg.norm(expected)
     residual = relative_residual(matrix, x, rhs)
@@ -208,7 +208,7 @@ def test_multigrid_iterations_hardly_grow_with_the_mesh():
         points, tets, inner = cube(m)
         matrix = restrict(laplacian(points, tets), inner)
         rhs = np.random.default_rng(0).standard_normal((len(inner), 3))
-        _, report = _core.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-8)
+        _, report = _core.linalg.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-8)
         steps.append(report.iterations)
     assert steps[-1] <= 15
     assert steps[-1] <= steps[0] + 5
@@ -221,7 +221,7 @@ def test_columns_are_independent(backend, k):
     matrix = restrict(laplacian(points, tets), inner)
     rhs = np.random.default_rng(k).standard_normal((len(inner), k))
     rhs[:, 0] = 0.0
-    solver = _core.SpdSolver(matrix, backend)
+    solver = _core.linalg.SpdSolver(matrix, backend)
     x, report = solver.solve(rhs, np.ones_like(rhs), 1e-10)
     assert len(report.residual) == k
     assert not x[:, 0].any()
@@ -232,7 +232,7 @@ def test_warm_start(solid):
     points, tets, inner = solid
     matrix = restrict(laplacian(points, tets), inner)
     rhs = np.random.default_rng(0).standard_normal((len(inner), 3))
-    solver = _core.SpdSolver(matrix, "multigrid")
+    solver = _core.linalg.SpdSolver(matrix, "multigrid")
     x, cold = solver.solve(rhs, np.zeros_like(rhs), 1e-8)
     again, report = solver.solve(rhs, x, 1e-8)
     assert report.iterations == 0
@@ -249,9 +249,9 @@ def test_refactor_follows_the_values(backend, solid):
     first = restrict(squeezed(points, tets, 0.0), inner)
     second = restrict(squeezed(points, tets, 0.5, seed=1), inner)
     assert (first.indices == second.indices).all()
-    solver = _core.SpdSolver(first, backend)
+    solver = _core.linalg.SpdSolver(first, backend)
     solver.solve(rhs, np.zeros_like(rhs), 1e-9, 5000)
-    fresh = _core.SpdSolver(second, backend).solve(rhs, np.zeros_like(rhs), 1e-9, 5000)[1]
+    fresh = _core.linalg.SpdSolver(second, backend).solve(rhs, np.zeros_like(rhs), 1e-9, 5000)[1]
     for _ in range(2):
         solver.refactor(second.data)
         x, report = solver.solve(rhs, np.zeros_like(rhs), 1e-9, 5000)
@@ -267,8 +267,8 @@ def test_units_do_not_matter(backend, solid):
     points, tets, inner = solid
     matrix = restrict(laplacian(points, tets), inner)
     rhs = np.random.default_rng(0).standard_normal((len(inner), 3))
-    x, _ = _core.SpdSolver(matrix, backend).solve(rhs, np.zeros_like(rhs), 1e-9)
-    solver = _core.SpdSolver((matrix * 2.0**-200).tocsr(), backend)
+    x, _ = _core.linalg.SpdSolver(matrix, backend).solve(rhs, np.zeros_like(rhs), 1e-9)
+    solver = _core.linalg.SpdSolver((matrix * 2.0**-200).tocsr(), backend)
     y, _ = solver.solve(rhs * 2.0**200, np.zeros_like(rhs), 1e-9)
     np.testing.assert_array_equal(y, x * 2.0**400)
 
@@ -278,7 +278,7 @@ def test_an_old_preconditioner_serves_for_a_small_change(solid):
     rhs = np.random.default_rng(0).standard_normal((len(inner), 3))
     first = restrict(squeezed(points, tets, 0.20), inner)
     second = restrict(squeezed(points, tets, 0.21), inner)
-    solver = _core.SpdSolver(first, "multigrid")
+    solver = _core.linalg.SpdSolver(first, "multigrid")
     _, fresh = solver.solve(rhs, np.zeros_like(rhs), 1e-9)
     solver.refactor(second.data, keep_preconditioner=True)
     x, kept = solver.solve(rhs, np.zeros_like(rhs), 1e-9)
@@ -291,8 +291,8 @@ def test_numbering_of_the_unknowns_does_not_matter(solid):
     matrix = restrict(squeezed(points, tets, 0.3), inner)
     rhs = np.random.default_rng(0).standard_normal((len(inner), 2))
     shuffle = np.random.default_rng(1).permutation(len(inner))
-    x, a = _core.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-11)
-    y, b = _core.SpdSolver(restrict(matrix, shuffle), "multigrid").solve(
+    x, a = _core.linalg.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-11)
+    y, b = _core.linalg.SpdSolver(restrict(matrix, shuffle), "multigrid").solve(
         rhs[shuffle], np.zeros_like(rhs), 1e-11
     )
     np.testing.assert_allclose(y, x[shuffle], rtol=0, atol=1e-7 * abs(x).max())
@@ -305,7 +305,7 @@ def test_components_and_uncoupled_unknowns():
     piece = restrict(laplacian(points, tets), inner)
     matrix = sp.block_diag([piece, sp.csr_matrix([[2.0]]), 1e-6 * piece]).tocsr()
     rhs = np.random.default_rng(0).standard_normal((matrix.shape[0], 1))
-    x, _ = _core.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-12)
+    x, _ = _core.linalg.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-12)
     np.testing.assert_allclose(x, splu(matrix.tocsc()).solve(rhs[:, 0])[:, None], rtol=1e-6)
 
 
@@ -314,14 +314,14 @@ def test_choice_of_backend(load_solid):
     solid = load_solid("rocker_arm_25182")
     inner = np.flatnonzero(solid.boundary_index < 0)
     matrix = restrict(laplacian(solid.V, solid.T), inner)
-    assert _core.SpdSolver(matrix).backend == "multigrid"
+    assert _core.linalg.SpdSolver(matrix).backend == "multigrid"
     points, tets, few = cube(8)
-    assert _core.SpdSolver(restrict(laplacian(points, tets), few)).backend == "direct"
+    assert _core.linalg.SpdSolver(restrict(laplacian(points, tets), few)).backend == "direct"
     n = 150
     line = sp.diags([-1.0, 2.1, -1.0], [-1, 0, 1], (n, n))
     surface = sp.kronsum(line, line).tocsr()
     assert surface.shape[0] == 22500
-    assert _core.SpdSolver(surface).backend == "direct"
+    assert _core.linalg.SpdSolver(surface).backend == "direct"
 
 
 def test_paper_size_solid(load_solid):
@@ -330,7 +330,7 @@ def test_paper_size_solid(load_solid):
     inner = np.flatnonzero(solid.boundary_index < 0)
     matrix = laplacian(solid.V, solid.T)
     rhs = -(matrix[inner][:, solid.boundary_vertices] @ solid.V[solid.boundary_vertices])
-    solver = _core.SpdSolver(restrict(matrix, inner), "multigrid")
+    solver = _core.linalg.SpdSolver(restrict(matrix, inner), "multigrid")
     x, report = solver.solve(rhs, np.zeros_like(rhs), 1e-10)
     assert report.iterations <= 25
     # The coordinates themselves are harmonic.
@@ -349,7 +349,7 @@ def test_indefinite_is_refused(backend):
     matrix = (path_matrix() - 0.5 * sp.eye(400)).tocsr()
     rhs = np.random.default_rng(0).standard_normal((400, 1))
     with pytest.raises(SolverError, match="not positive definite"):
-        _core.SpdSolver(matrix, backend).solve(rhs, np.zeros_like(rhs))
+        _core.linalg.SpdSolver(matrix, backend).solve(rhs, np.zeros_like(rhs))
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -357,7 +357,7 @@ def test_bad_diagonal_is_named(backend):
     matrix = path_matrix()
     matrix[7, 7] = -1.0
     with pytest.raises(SolverError, match="row 7") as caught:
-        _core.SpdSolver(matrix, backend)
+        _core.linalg.SpdSolver(matrix, backend)
     assert caught.value.ids == (7,)
 
 
@@ -366,14 +366,14 @@ def test_refusals(backend):
     skew = path_matrix().tolil()
     skew[3, 4] = -0.5
     with pytest.raises(SolverError, match="not symmetric"):
-        _core.SpdSolver(skew.tocsr(), backend)
+        _core.linalg.SpdSolver(skew.tocsr(), backend)
     holed = path_matrix()
     holed.data[5] = np.nan
     with pytest.raises(SolverError, match="not finite"):
-        _core.SpdSolver(holed, backend)
+        _core.linalg.SpdSolver(holed, backend)
     with pytest.raises(SolverError, match="square"):
-        _core.SpdSolver(path_matrix()[:-1], backend)
-    solver = _core.SpdSolver(path_matrix(), backend)
+        _core.linalg.SpdSolver(path_matrix()[:-1], backend)
+    solver = _core.linalg.SpdSolver(path_matrix(), backend)
     with pytest.raises(SolverError, match="not finite"):
         solver.solve(np.full((400, 1), np.nan), np.zeros((400, 1)))
     with pytest.raises(SolverError, match="row per unknown"):
@@ -383,14 +383,14 @@ def test_refusals(backend):
 def test_unknown_backend():
     if "cholmod" not in BACKENDS:
         with pytest.raises(MissingDependencyError, match="STRETCHMAP_CHOLMOD=ON"):
-            _core.SpdSolver(path_matrix(), "cholmod")
+            _core.linalg.SpdSolver(path_matrix(), "cholmod")
     with pytest.raises(OptionError, match="choose auto, direct"):
-        _core.SpdSolver(path_matrix(), "lu")
+        _core.linalg.SpdSolver(path_matrix(), "lu")
 
 
 def test_not_converged_is_an_error_unless_asked_otherwise():
     rhs = np.ones((400, 1))
-    solver = _core.SpdSolver(path_matrix(), "jacobi")
+    solver = _core.linalg.SpdSolver(path_matrix(), "jacobi")
     with pytest.raises(SolverError, match="stopped at a relative residual"):
         solver.solve(rhs, np.zeros_like(rhs), 1e-10, 5)
     x, report = solver.solve(rhs, np.zeros_like(rhs), 1e-10, 5, must_converge=False)
@@ -406,7 +406,7 @@ import test_linalg as t
 points, tets, inner = t.cube(25)
 matrix = t.restrict(t.squeezed(points, tets, 0.3), inner)
 rhs = np.random.default_rng(0).standard_normal((len(inner), 3))
-x, _ = t._core.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-9)
+x, _ = t._core.linalg.SpdSolver(matrix, "multigrid").solve(rhs, np.zeros_like(rhs), 1e-9)
 print(t.hashlib.sha256(x.tobytes()).hexdigest())
 """
 
@@ -435,8 +435,8 @@ def test_modes_are_the_kernel_of_free_elasticity():
     points, tets, _ = cube(4)
     local = neo_hookean(points, tets, points, 0.3)
     stiffness = assemble_blocks(local, tets, len(points), [])
-    modes = _core.rigid_body_modes(points)
-    np.testing.assert_array_equal(modes[:, :3], _core.translations(len(points)))
+    modes = _core.testing.rigid_body_modes(points)
+    np.testing.assert_array_equal(modes[:, :3], _core.testing.translations(len(points)))
     assert np.linalg.matrix_rank(modes) == 6
     # The clamp at 1e-6 that makes the elements definite is all that rotations see.
     assert abs(stiffness @ modes).max() < 1e-5 * abs(stiffness.data).max()
@@ -448,7 +448,9 @@ def test_modes_are_the_kernel_of_free_elasticity():
 def test_newton_systems_agree_with_a_factorisation(preconditioner, rigid, poisson, deformed_solid):
     blocks, image, missing = deformed_solid(poisson)
     rhs = np.random.default_rng(0).standard_normal((len(image), 3))
-    modes = _core.rigid_body_modes(image) if rigid else _core.translations(len(image))
+    modes = (
+        _core.testing.rigid_body_modes(image) if rigid else _core.testing.translations(len(image))
+    )
     solver = block_solver(blocks, modes, preconditioner)
     x, report = solver.solve(rhs, np.zeros_like(rhs), 1e-9, 3000)
     expected = splu(blocks.tocsc()).solve(rhs.ravel())
@@ -485,9 +487,9 @@ def test_rigid_modes_pay_where_the_boundary_glides(deformed_solid):
     expected = splu(blocks.tocsc()).solve(rhs.ravel())
     iterations = []
     for modes in (
-        _core.translations(len(points)),
-        in_frames(_core.translations(len(points))),
-        in_frames(_core.rigid_body_modes(points)),
+        _core.testing.translations(len(points)),
+        in_frames(_core.testing.translations(len(points))),
+        in_frames(_core.testing.rigid_body_modes(points)),
     ):
         x, report = block_solver(blocks, modes).solve(rhs, np.zeros_like(rhs), 1e-9, 3000)
         assert np.linalg.norm(x.ravel() - expected) < 1e-5 * np.linalg.norm(expected)

@@ -139,14 +139,16 @@ def test_cutting_one_tet_gives_the_share_of_the_formula():
             values[RNG.integers(4)] = 0.0
         if trial % 6 == 0:
             values[RNG.integers(4)] = 0.0
-        split = _core.split_tets(T, values, np.zeros(0))
+        split = _core.partitions.split_tets(T, values, np.zeros(0))
         a, b = split.cut_edges.T
         w = split.cut_weight[:, None]
         points = np.concatenate([V, (1 - w) * V[a] + w * V[b]])
-        volumes = _core.tet_volumes(points, split.tets)
+        volumes = _core.mesh.tet_volumes(points, split.tets)
         assert volumes.min() > 0.0 and volumes.sum() == pytest.approx(1 / 6, rel=1e-12)
         below = volumes[split.side < 0].sum()
-        assert below == pytest.approx(_core.volume_below(T, np.array([1 / 6]), values), abs=1e-13)
+        assert below == pytest.approx(
+            _core.partitions.volume_below(T, np.array([1 / 6]), values), abs=1e-13
+        )
         samples_below = (RNG.dirichlet(np.ones(4), 2000) @ values < 0).mean() / 6
         assert below == pytest.approx(samples_below, abs=0.01)
 

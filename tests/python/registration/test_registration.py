@@ -198,7 +198,7 @@ def test_surface_derivatives_match_finite_differences():
     """On a flat patch of the target the energy's gradient is exact in both models."""
     surface = samples.torus_surface(24, 12)
     flat = FlatSurface.of(surface)
-    rest = _core.rest_triangles(surface.V, surface.F, 1.0)
+    rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0)
     weights = surface.face_areas / surface.area
     # Points in general position inside faces; the edges of the chart's faces are smooth there.
     y = flat.turns + np.array([0.013, 0.017])
@@ -210,13 +210,13 @@ def test_surface_derivatives_match_finite_differences():
     edges = np.stack([V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]], axis=-1)
     chart_edges = np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=-1)
     slopes = np.ascontiguousarray((edges @ np.linalg.inv(chart_edges)).reshape(-1, 6))
-    gradient, hessian = _core.match_model(flat.chart, y, X, slopes, rest, weights)
+    gradient, hessian = _core.registration.match_model(flat.chart, y, X, slopes, rest, weights)
     assert np.abs(hessian - hessian.T).max() < 1e-12 * np.abs(hessian).max()
     direction = RNG.standard_normal(y.shape)
     step = 1e-7
 
     def energy(z):
-        return _core.match_value(flat.chart, z, flat.points(z), rest, weights)
+        return _core.registration.match_value(flat.chart, z, flat.points(z), rest, weights)
 
     difference = (energy(y + step * direction) - energy(y - step * direction)) / (2 * step)
     assert difference == pytest.approx(gradient @ direction.ravel(), rel=1e-5)
@@ -254,12 +254,12 @@ def test_a_boundary_image_that_crosses_itself_is_refined():
     y = FlatSurface.of(source.surface).turns
     y = y + np.stack([0.04 * np.cos(2 * np.pi * y[:, 1]), 0.0 * y[:, 1]], axis=1)
     points, n = target.points(y), len(y)
-    assert len(_core.crossing_faces(points, source.surface.F, 1000)) > 50
+    assert len(_core.certificate.crossing_faces(points, source.surface.F, 1000)) > 50
     held = np.arange(0, n, 20, dtype=np.int32)
     result = embed_boundary(source, target, y, points, held)
     solid, surface = result.solid, result.solid.surface
     assert not len(result.crossings)
-    assert not len(_core.crossing_faces(result.points, surface.F, 1000))
+    assert not len(_core.certificate.crossing_faces(result.points, surface.F, 1000))
     assert solid.n_vertices > source.n_vertices and solid.diagnose().ok
     assert np.array_equal(solid.V[: source.n_vertices], source.V)
     assert np.array_equal(result.points[held], points[held])
@@ -300,14 +300,14 @@ def test_flat_derivatives_match_finite_differences():
     surface = samples.torus_surface(24, 12)
     flat = FlatSurface.of(surface)
     lattice = np.array([[2.0, 0.3], [0.0, 0.5]])
-    rest = _core.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
+    rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
     weights = surface.face_areas / surface.area
     y = flat.turns + 1e-3 * RNG.standard_normal(flat.turns.shape)
-    gradient, hessian = _core.flat_model(flat.chart, y, lattice, rest, weights)
+    gradient, hessian = _core.registration.flat_model(flat.chart, y, lattice, rest, weights)
     assert np.abs(hessian - hessian.T).max() < 1e-12 * np.abs(hessian).max()
     direction = RNG.standard_normal(y.shape)
     difference = [
-        _core.flat_value(flat.chart, y + step * direction, lattice, rest, weights)
+        _core.registration.flat_value(flat.chart, y + step * direction, lattice, rest, weights)
         for step in (1e-7, -1e-7)
     ]
     slope = (difference[0] - difference[1]) / 2e-7
@@ -317,18 +317,18 @@ def test_flat_derivatives_match_finite_differences():
 def test_vertices_moved_one_by_one_lower_the_energy():
     surface = samples.vertebra_like(6000).surface
     flat = FlatSurface.of(surface)
-    rest = _core.rest_triangles(surface.V, surface.F, 1.0)
+    rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0)
     weights = surface.face_areas / surface.area
     y = flat.turns + np.array([0.1, 0.05])
     X = flat.points(y)
     held = np.zeros(len(y), np.uint8)
     held[::3] = 1
-    before = _core.match_value(flat.chart, y, X, rest, weights)
-    moved, there, _, gain, count = _core.relax_match(
+    before = _core.registration.match_value(flat.chart, y, X, rest, weights)
+    moved, there, _, gain, count = _core.registration.relax_match(
         flat.chart, flat.locator, surface.V, surface.F, flat.face_slopes, rest, weights, held, 2,
         y, X, np.full(len(y), 0.02),
     )  # fmt: skip
-    after = _core.match_value(flat.chart, moved, there, rest, weights)
+    after = _core.registration.match_value(flat.chart, moved, there, rest, weights)
     assert count > 0 and gain > 0.0 and after == pytest.approx(before - gain, rel=1e-9)
     assert np.array_equal(moved[::3], y[::3]) and np.allclose(flat.points(moved), there, atol=1e-12)
 
@@ -350,7 +350,7 @@ def test_faces_cut_along_the_target_end_on_its_surface():
     source, target = samples.solid_torus(400), FlatSurface.of(samples.bumpy_torus(1500).surface)
     y = FlatSurface.of(source.surface).turns + np.array([0.013, 0.17])
     n, points, solid = len(y), target.points(y), source
-    gap = [abs(_core.enclosed_volume(points, source.surface.F) / target.surface.volume - 1.0)]
+    gap = [abs(_core.mesh.enclosed_volume(points, source.surface.F) / target.surface.volume - 1.0)]
     for _ in range(60):
         faces = np.arange(solid.surface.n_faces)
         edges, shares, where = overlay_splits(solid.surface, target, y, points, faces)
@@ -361,7 +361,7 @@ def test_faces_cut_along_the_target_end_on_its_surface():
         points = target.points(y)
         assert (flat_areas(y, solid.surface.F) > 0.0).all()
         gap.append(
-            abs(_core.enclosed_volume(points, solid.surface.F) / target.surface.volume - 1.0)
+            abs(_core.mesh.enclosed_volume(points, solid.surface.F) / target.surface.volume - 1.0)
         )
     assert not len(edges) and gap[0] > 1e-2 and gap[-1] < 1e-9
     image = TriMesh(points, solid.surface.F)

@@ -108,8 +108,9 @@ def test_the_search_lowers_its_energy_and_leaves_good_corners_alone(standard):
     shaken = mesh.V + 0.02 * RNG.standard_normal(mesh.V.shape)
 
     def relax(start, slack, pull):
-        return _core.relax_grid(
-            tets, rest, np.ones(len(tets)), _core.EnergyWeights(1.0, 1.0), slack, 1.0, mesh.V, y,
+        return _core.resample.relax_grid(
+            tets, rest, np.ones(len(tets)), _core.volume.EnergyWeights(1.0, 1.0), slack, 1.0,
+            mesh.V, y,
             np.full(len(start), pull), surface.locator, surface.surface.V, surface.surface.F,
             surface.face_slopes, rim, 2, y, start, np.full(len(start), 0.05),
         )  # fmt: skip

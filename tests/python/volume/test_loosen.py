@@ -34,10 +34,10 @@ def bolt():
     q = (1.0 - share) * np.stack([p, z], axis=1) + share * BOLT[corner]
     image = np.stack([(3.0 + q[:, 0]) * np.cos(u), (3.0 + q[:, 0]) * np.sin(u), q[:, 1]], axis=1)
     faces = source.surface.F
-    assert not len(_core.crossing_faces(image, faces, 10))
+    assert not len(_core.certificate.crossing_faces(image, faces, 10))
     V = refinement.solid.V / source.volume ** (1.0 / 3.0)
     start = V.copy()
-    start[ids] = image / _core.enclosed_volume(image, faces) ** (1.0 / 3.0)
+    start[ids] = image / _core.mesh.enclosed_volume(image, faces) ** (1.0 / 3.0)
     solver = FlipFreeSolver(
         V=V, T=refinement.solid.T, boundary=ids, faces=ids[faces], R=2.0, r=1.0,
         options=FlipFreeOptions(),
@@ -51,13 +51,13 @@ def test_a_vertex_without_room_is_given_company(bolt, caplog):
     assert left > 0
     with caplog.at_level(logging.INFO, "stretchmap"):
         solver, done, x, left = untangle_refining(solver, refinement, start, glide=False)
-    assert left == 0 and (_core.signed_tet_volumes(x, done.solid.T) > 0.0).all()
+    assert left == 0 and (_core.volume.signed_tet_volumes(x, done.solid.T) > 0.0).all()
     assert "are stuck" in caplog.text
     ids = source.boundary_vertices
     np.testing.assert_array_equal(x[ids], start[ids])
     np.testing.assert_array_equal(done.solid.boundary_vertices, ids)
     # Only the tets at the inverted ones have been cut.
-    flipped = _core.signed_tet_volumes(stuck, refinement.solid.T) <= 0.0
+    flipped = _core.volume.signed_tet_volumes(stuck, refinement.solid.T) <= 0.0
     near = np.isin(refinement.solid.T, refinement.solid.T[flipped]).any(axis=1)
     cut = np.bincount(done.parent_tet, minlength=source.n_tets) > 1
     assert cut.any() and not cut[~near].any()
@@ -94,7 +94,7 @@ def test_the_certified_route_refines_where_it_may(bolt):
         problem, run = certified_route(
             problem, options, glide=False, vertex_exact=False, solver="auto", progress=None
         )
-        volumes = _core.signed_tet_volumes(run.x, problem.solid.T)
+        volumes = _core.volume.signed_tet_volumes(run.x, problem.solid.T)
         if given is None:
             assert problem.solid is refinement.solid and not (volumes > 0.0).all()
             assert "could not be untangled" in run.stop_reason

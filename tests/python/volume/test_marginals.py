@@ -75,7 +75,7 @@ def test_targets_ask_for_what_is_missing_and_add_up(solid, axis):
     tool = marginals(solid)
     moved = distorted(solid, axis)
     targets = tool.targets(tool.measure(moved))
-    volumes = _core.signed_tet_volumes(moved, solid.T)
+    volumes = _core.volume.signed_tet_volumes(moved, solid.T)
     ratio = tool.shares / (volumes / volumes.sum())
     # Exact up to the width of a bin; the distortion is a function of one coordinate.
     assert np.corrcoef(targets, ratio)[0, 1] > 0.8
@@ -89,11 +89,11 @@ def test_targets_are_reached_by_the_energy(solid):
     shares = solid.tet_volumes / solid.volume
     motion = np.ones(len(V), np.uint8)  # all fixed but one
     motion[np.setdiff1d(np.arange(len(V)), solid.boundary_vertices)[0]] = 0
-    newton = _core.SolidNewton(
-        T, _core.rest_matrices(V, T, 1e6), shares, motion, 3.0, 1.0, V,
+    newton = _core.volume.SolidNewton(
+        T, _core.volume.rest_matrices(V, T, 1e6), shares, motion, 3.0, 1.0, V,
         np.zeros((0, 3), np.int32), np.zeros((0, 4)), np.zeros(0),
     )  # fmt: skip
-    weights = _core.EnergyWeights(0.0, 1.0, 0.0, 0.0)
+    weights = _core.volume.EnergyWeights(0.0, 1.0, 0.0, 0.0)
     assert newton.value(V, weights).energy == pytest.approx(0.0, abs=1e-12)
     target = np.linspace(0.5, 2.0, len(T))
     newton.set_targets(target)
@@ -119,7 +119,7 @@ def test_uncorrected_fifths_of_a_vertebra(load_solid):
 def test_few_tets_do_no_harm():
     small = samples.solid_torus(400, R=3.0, r=1.0)
     moved = marginals(small).shifted(small.V)
-    assert (_core.signed_tet_volumes(moved, small.T) > 0.0).all()
+    assert (_core.volume.signed_tet_volumes(moved, small.T) > 0.0).all()
 
 
 def test_the_histogram_counts_every_tet_at_four_points(solid):
@@ -128,7 +128,7 @@ def test_the_histogram_counts_every_tet_at_four_points(solid):
     far = (5.0 - np.sqrt(5.0)) / 20.0
     weights = np.full((4, 4), far) + np.eye(4) * (1.0 - 4.0 * far)
     bins = np.clip((values[solid.T] @ weights * 20.0).astype(int), 0, 19).ravel()
-    found = _core.level_histogram(solid.T, values, amounts, 20, 1.0, False)
+    found = _core.volume.level_histogram(solid.T, values, amounts, 20, 1.0, False)
     for column, amount in zip(found.T, amounts.T, strict=True):
         expected = np.bincount(bins, np.repeat(0.25 * amount, 4), minlength=20)
         # A point on the border of two bins may fall into either.
@@ -144,9 +144,9 @@ def test_equalising_takes_no_more_than_a_fifth_of_a_tet(solid):
     )  # fmt: skip
     moved = solid.V + np.random.default_rng(0).normal(scale=0.01, size=solid.V.shape)
     kept = solver._gently_moved(solid.V, moved, solid.tet_volumes)
-    ratios = _core.signed_tet_volumes(kept, solid.T) / solid.tet_volumes
+    ratios = _core.volume.signed_tet_volumes(kept, solid.T) / solid.tet_volumes
     assert ratios.min() > 0.8 and ratios.max() < 1.25
-    ratios = _core.signed_tet_volumes(moved, solid.T) / solid.tet_volumes
+    ratios = _core.volume.signed_tet_volumes(moved, solid.T) / solid.tet_volumes
     assert ratios.min() < 0.8 or ratios.max() > 1.25
     went = (kept != solid.V).any(axis=1)
     assert went.any() and not went.all() and np.array_equal(kept[went], moved[went])

@@ -13,6 +13,7 @@ using Index = std::int32_t;
 
 using Vec = Eigen::VectorXd;
 using IndexVec = Eigen::Matrix<Index, Eigen::Dynamic, 1>;
+using Flags = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>;
 
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using Points2 = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
@@ -30,6 +31,7 @@ using FacesRef = Eigen::Ref<const Faces>;
 using TetsRef = Eigen::Ref<const Tets>;
 using VecRef = Eigen::Ref<const Vec>;
 using IndexVecRef = Eigen::Ref<const IndexVec>;
+using FlagsRef = Eigen::Ref<const Flags>;
 
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor, Index>;
 

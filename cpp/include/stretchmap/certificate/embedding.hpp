@@ -3,7 +3,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::certificate {
 
 // Tets whose signed volume is not proven positive (exact sign, see orient3d), ascending.
 IndexVec not_positive_tets(const PointsRef& points, const TetsRef& tets);
@@ -18,4 +18,4 @@ bool triangles_meet(const PointsRef& points, const Eigen::Matrix<Index, 1, 3>& a
 Edges crossing_faces(const PointsRef& points, const FacesRef& faces, Index limit,
                      const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::certificate

@@ -10,7 +10,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::certificate {
 
 struct TorusGraph {
   IndexVec bad;    // faces where the condition is not proven, ascending
@@ -21,4 +21,4 @@ struct TorusGraph {
 // faces outward. \pre R > 0.
 TorusGraph torus_graph(const PointsRef& points, const FacesRef& faces, double R);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::certificate

@@ -4,7 +4,7 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
 
-namespace stretchmap {
+namespace stretchmap::forms {
 
 struct HarmonicSolution {
   Rows forms;       // (k, e) eta + d potential
@@ -21,4 +21,4 @@ struct HarmonicSolution {
 HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const VecRef& weights,
                                 const RowsRef& eta);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::forms

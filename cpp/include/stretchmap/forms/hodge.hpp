@@ -4,11 +4,11 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
 
-namespace stretchmap {
+namespace stretchmap::forms {
 
 // (m, 3) the tangent vector of each face whose product with an edge is the closed form (e) on that
 // edge, (3.6).
-Points form_vectors(const SurfaceTopology& top, const PointsRef& points, const VecRef& form);
+Points form_vectors(const mesh::SurfaceTopology& top, const PointsRef& points, const VecRef& form);
 
 struct HodgeProducts {
   Rows star;   // (k, k) integrals of form_l ^ *form_m: b of (3.10), one column per m
@@ -17,11 +17,11 @@ struct HodgeProducts {
 
 // Both integrals from the vector proxies, face by face.
 // \pre faces oriented outward, none without area.
-HodgeProducts hodge_products(const SurfaceTopology& top, const PointsRef& points,
+HodgeProducts hodge_products(const mesh::SurfaceTopology& top, const PointsRef& points,
                              const RowsRef& forms);
 
 // (m) integral of first ^ second over each face: the signed area of the face in the chart whose
 // coordinates have these differentials.
-Vec chart_areas(const SurfaceTopology& top, const VecRef& first, const VecRef& second);
+Vec chart_areas(const mesh::SurfaceTopology& top, const VecRef& first, const VecRef& second);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::forms

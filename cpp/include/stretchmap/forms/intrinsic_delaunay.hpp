@@ -4,7 +4,7 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
 
-namespace stretchmap {
+namespace stretchmap::forms {
 
 struct IntrinsicDelaunay {
   Edges edges;        // (e, 2) not sorted; an edge may join a vertex to itself
@@ -17,7 +17,7 @@ struct IntrinsicDelaunay {
 // a new diagonal gets the sum over two sides of its quadrilateral.
 // \pre    closed surface, no face without area; eta (k, e) closed.
 // \throws Error "SolverError" when rounding keeps the flips from ending (needle triangles).
-IntrinsicDelaunay intrinsic_delaunay(const SurfaceTopology& top, const VecRef& edge_length,
+IntrinsicDelaunay intrinsic_delaunay(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                                      const Eigen::Ref<const IndexRows>& eta);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::forms

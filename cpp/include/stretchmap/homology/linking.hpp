@@ -6,7 +6,7 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/homology/tree_cotree.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
 using LinkingMatrix = Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -21,7 +21,7 @@ using LinkingMatrix = Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic
 // \pre    closed surface, faces outward, loops simple and not bounding a single face.
 // \throws Error "SelfIntersectionError" where no projection decides: loops that touch elsewhere,
 //         degenerate faces.
-LinkingMatrix linking_matrix(const SurfaceTopology& top, const PointsRef& points,
+LinkingMatrix linking_matrix(const mesh::SurfaceTopology& top, const PointsRef& points,
                              const std::vector<Loop>& loops, const Poll& poll = {});
 
 // Linking number of two closed polygons, the first point not repeated, by the signed crossings in
@@ -29,4 +29,4 @@ LinkingMatrix linking_matrix(const SurfaceTopology& top, const PointsRef& points
 // \throws Error "SolverError" where no projection decides: they touch.
 std::int64_t linking_number(const PointsRef& p, const PointsRef& q, const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

@@ -4,7 +4,7 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/homology/tree_cotree.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
 // The shortest closed walk along edges whose period over form i is target[i].
 //
@@ -27,8 +27,8 @@ namespace stretchmap {
 // \param target      (k) not zero
 // \param crossing    a loop with non-zero intersection number with the class
 // \throws Error "SolverError" when no loop of the class passes through `crossing`.
-Loop shortest_loop(const SurfaceTopology& top, const VecRef& edge_length,
+Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                    const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
                    const Loop& crossing, const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

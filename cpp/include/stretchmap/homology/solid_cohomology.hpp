@@ -6,7 +6,7 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/homology/tree_cotree.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
 // H^1(M; Z) is the kernel of `relations`: a vector x in Z^k with relations x = 0 is a closed
 // integer 1-form of the tet mesh, up to exact ones, and its integrals over the loops are
@@ -26,4 +26,4 @@ struct SolidCohomology {
 SolidCohomology solid_cohomology(const TetsRef& tets, const EdgesRef& edges, Index n_vertices,
                                  const std::vector<Loop>& loops, const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

@@ -6,7 +6,7 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
 
-namespace stretchmap {
+namespace stretchmap::homology {
 
 using Loop = std::vector<Index>;  // vertex ids, the first not repeated at the end
 
@@ -22,24 +22,21 @@ struct HomologyGenerators {
 // are the forms.
 // \pre    closed, oriented surface without unreferenced vertices; edge_length (e) positive.
 // \throws Error "ConnectivityError" when the surface has more than one component.
-HomologyGenerators tree_cotree(const SurfaceTopology& top, const VecRef& edge_length);
-
-// (e) Euclidean edge lengths.
-Vec edge_lengths(const SurfaceTopology& top, const PointsRef& points);
+HomologyGenerators tree_cotree(const mesh::SurfaceTopology& top, const VecRef& edge_length);
 
 // The half-edge from vertex i to vertex j, -1 when there is no such edge. Closed surfaces only.
-Index find_halfedge(const SurfaceTopology& top, Index i, Index j);
+Index find_halfedge(const mesh::SurfaceTopology& top, Index i, Index j);
 
 // The half-edges along a loop; entry k leaves loop[k].
 // \throws Error "ArrayError" when two consecutive vertices are not joined by an edge.
-std::vector<Index> loop_halfedges(const SurfaceTopology& top, const Loop& loop);
+std::vector<Index> loop_halfedges(const mesh::SurfaceTopology& top, const Loop& loop);
 
 // (k) integrals of k integer 1-forms (k, e) along a loop.
-IndexVec periods(const SurfaceTopology& top, const Eigen::Ref<const IndexRows>& forms,
+IndexVec periods(const mesh::SurfaceTopology& top, const Eigen::Ref<const IndexRows>& forms,
                  const Loop& loop);
 
 // (k, k) integrals of form_i ^ form_j over the surface: on a face with corners 0, 1, 2 it is
 // (a01 b12 - a12 b01) / 2. Antisymmetric, integer for integer closed forms.
-Rows wedge_matrix(const SurfaceTopology& top, const RowsRef& forms);
+Rows wedge_matrix(const mesh::SurfaceTopology& top, const RowsRef& forms);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::homology

@@ -7,7 +7,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::linalg {
 
 // K unknowns per block row, 2 or 3. The symbolic analysis belongs to the pattern and is done once.
 template <int K>
@@ -39,4 +39,4 @@ class BlockLdlt {
   std::vector<Part> diagonal_;  // D
 };
 
-}  // namespace stretchmap
+}  // namespace stretchmap::linalg

@@ -7,7 +7,7 @@
 
 #include "stretchmap/linalg/solve.hpp"
 
-namespace stretchmap {
+namespace stretchmap::linalg {
 
 // Block compressed rows. Entry e of block row i (row_ptr[i] <= e < row_ptr[i + 1]) is the 3x3 block
 // at block column col[e], row-major in values[9 e .. 9 e + 8]. Columns ascend within a row; both
@@ -68,4 +68,4 @@ class BlockSolver {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace stretchmap
+}  // namespace stretchmap::linalg

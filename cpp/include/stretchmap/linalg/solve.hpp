@@ -3,7 +3,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::linalg {
 
 struct SolveOptions {
   double tol = 1e-10;         // goal for |b - A x| / |b| of every right-hand side, Euclidean norm
@@ -19,4 +19,4 @@ struct SolveReport {
       false;  // block solver only: stopped because A was seen to be indefinite
 };
 
-}  // namespace stretchmap
+}  // namespace stretchmap::linalg

@@ -7,7 +7,7 @@
 
 #include "stretchmap/linalg/solve.hpp"
 
-namespace stretchmap {
+namespace stretchmap::linalg {
 
 struct SpdOptions {
   // "direct"     sparse Cholesky, approximate-minimum-degree ordering: surfaces, small solids.
@@ -63,4 +63,4 @@ class SpdSolver {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace stretchmap
+}  // namespace stretchmap::linalg

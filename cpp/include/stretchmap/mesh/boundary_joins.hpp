@@ -9,7 +9,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 struct BoundaryJoins {
   Edges edges;    // (a, 2) interior edges between boundary vertices, lower id first, in
@@ -35,4 +35,4 @@ BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices, const Poll& 
 Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets,
                                  const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -7,7 +7,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 struct SurfaceDiagnosis {
   IndexVec repeated;              // faces that use a vertex twice
@@ -49,4 +49,4 @@ struct SolidDiagnosis {
 SurfaceDiagnosis diagnose_surface(const PointsRef& points, const FacesRef& faces);
 SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets, const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -6,7 +6,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 class DisjointSets {
  public:
@@ -56,4 +56,4 @@ Components components(const Elements& elements, Index n_vertices, const std::vec
   return result;
 }
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -8,7 +8,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 inline constexpr int kTetFace[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 inline constexpr int kTetEdge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
@@ -44,4 +44,4 @@ inline Eigen::Matrix<Index, 1, 3> half_face(const TetsRef& tets, Index h) {
 // +1 when two triples with the same three vertices run round the triangle the same way, else -1.
 int same_turn(const Eigen::Matrix<Index, 1, 3>& a, const Eigen::Matrix<Index, 1, 3>& b);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

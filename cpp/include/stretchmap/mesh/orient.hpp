@@ -6,7 +6,7 @@
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/mesh/facets.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 // Elements linked across facets that exactly two of them share.
 struct Patches {
@@ -39,4 +39,4 @@ IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets);
 // Indices of all set entries.
 IndexVec set_entries(const Mask& mask);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

@@ -2,8 +2,9 @@
 #pragma once
 
 #include "stretchmap/base/types.hpp"
+#include "stretchmap/mesh/surface_topology.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 // (m, 3) half the cross product of two sides: the area as length, the normal as direction.
 Points face_area_vectors(const PointsRef& points, const FacesRef& faces);
@@ -26,4 +27,7 @@ Eigen::Array<bool, Eigen::Dynamic, 1> degenerate_faces(const PointsRef& points,
                                                        const FacesRef& faces);
 Eigen::Array<bool, Eigen::Dynamic, 1> degenerate_tets(const PointsRef& points, const TetsRef& tets);
 
-}  // namespace stretchmap
+// (e) Euclidean edge lengths.
+Vec edge_lengths(const SurfaceTopology& top, const PointsRef& points);
+
+}  // namespace stretchmap::mesh

@@ -8,7 +8,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 struct SurfaceTopology {
   Index n_vertices = 0;
@@ -33,4 +33,4 @@ struct SurfaceTopology {
 //         Error "OrientationError" for two faces that run along an edge in the same direction.
 SurfaceTopology surface_topology(const FacesRef& faces, Index n_vertices);
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

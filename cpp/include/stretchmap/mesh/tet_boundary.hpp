@@ -3,7 +3,7 @@
 
 #include "stretchmap/base/types.hpp"
 
-namespace stretchmap {
+namespace stretchmap::mesh {
 
 struct TetBoundary {
   Faces faces;        // (m, 3) in the surface's own vertex numbering, outward
@@ -24,4 +24,4 @@ IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices, const Poll& poll 
 // (e, 2) edges of a tet mesh, lower id first, in lexicographic order.
 Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
-}  // namespace stretchmap
+}  // namespace stretchmap::mesh

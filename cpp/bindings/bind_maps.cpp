@@ -1,0 +1,18 @@
+#include "arrays.hpp"
+#include "stretchmap/maps/tet_locator.hpp"
+
+namespace stretchmap::maps {
+void bind(py::module_& m) {
+  py::class_<TetLocator>(m, "TetLocator")
+      .def(py::init<const PointsRef&, const TetsRef&, double>(), py::arg("points").noconvert(),
+           py::arg("tets").noconvert(), py::arg("tolerance"), release_gil())
+      .def(
+          "locate",
+          [](const TetLocator& self, const PointsRef& queries) {
+            TetLocation found = self.locate(queries, signal_poll());
+            return std::make_pair(std::move(found.tet), std::move(found.weights));
+          },
+          py::arg("queries").noconvert(), release_gil());
+}
+
+}  // namespace stretchmap::maps

@@ -1,0 +1,61 @@
+// Energy of a surface glued to a torus of revolution, its vertices free to glide (two angles each),
+// measured on the polyhedral image in space:
+//
+//   sum over faces |t| [ area   (rho + 1/rho - 2)         rho   = |g(t)| / (scale |t|)
+//                      + shape  ((s1/s2 + s2/s1)/2 - 1)   s     = singular values of the face's map
+//                      + chart  (sigma + 1/sigma - 2) ]   sigma = signed area in the (u, v) chart
+//                                                         times the torus' density at its middle,
+//                                                         over |t|
+//
+// The last term is infinite before any face can turn over in the chart. With `facing` it is joined
+// by the mean over the corners of sigma_k + 1/sigma_k - 2, sigma_k = component of g(t)'s area
+// vector along the torus' normal at corner k over |t|: infinite before the flat face turns inward
+// at a corner, which a coarse face can do while its chart area is positive. Areas of source and
+// torus are scaled to one.
+#pragma once
+
+#include "stretchmap/area/chart.hpp"
+#include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::area {
+
+struct SurfaceWeights {
+  double area = 1.0;
+  double shape = 0.0;
+  double chart = 0.0;
+};
+
+struct GlideProblem {
+  SurfaceChart chart;
+  SurfaceReference reference;
+  double ratio = 2.0;   // R / r
+  bool facing = false;  // whether faces are kept from turning inward at their corners
+};
+
+struct GlideEnergy {
+  double value = 0.0;  // infinity where a face has no positive area in the chart
+  Vec gradient;        // (2n) by (u, v) of each vertex; empty if not asked for
+  Rows hessians;       // (m, 36) one 6x6 matrix per face, empty if not asked for
+};
+
+enum class Derivatives { kNone, kGradient, kHessian, kModel };
+
+// angles (n, 2): (u, v) in radians. kHessian is exact; kModel is what Newton steps use: positive
+// semi-definite face by face, with a part of the areas' own curvature only.
+GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
+                         const Points2Ref& angles, Derivatives derivatives);
+
+// The scale at which the area term is least: sqrt(sum |g| / sum (|t|^2 / |g|)).
+double best_scale(const GlideProblem& problem, const Points2Ref& angles);
+
+// (n, 3) points of the torus of area one.
+Points glide_image(const GlideProblem& problem, const Points2Ref& angles);
+
+// Whether every flat image face looks outward at all its corners.
+bool all_facing(const GlideProblem& problem, const Points2Ref& angles);
+
+// (m) areas of the polyhedral image; the torus itself has area one.
+Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles);
+
+}  // namespace stretchmap::area

@@ -1,0 +1,27 @@
+// A sparse matrix assembled from one dense block per face, on a pattern found once.
+#pragma once
+
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::area {
+
+// `block` unknowns per vertex; unknown c of vertex i is block * i + c.
+class SurfacePattern {
+ public:
+  SurfacePattern(const FacesRef& faces, Index n_vertices, int block);
+
+  // All zeros, both triangles stored.
+  const SparseMatrix& zeros() const { return zeros_; }
+
+  // elements (m, (3 block)^2): row f is the matrix of face f, row-major, unknown c of its corner k
+  // at block * k + c. Overwrites `values` with the sum over the faces, faces in order.
+  void scatter(const RowsRef& elements, double* values) const;
+
+ private:
+  SparseMatrix zeros_;
+  std::vector<Index> slot_;  // m (3 block)^2 positions in the value array
+};
+
+}  // namespace stretchmap::area

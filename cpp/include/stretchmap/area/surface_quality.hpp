@@ -1,0 +1,39 @@
+// What a map to the torus of revolution does to a surface, measured on the polyhedral image: the
+// cheap objective by which the poloidal phase and the ratio of the radii are chosen.
+#pragma once
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::area {
+
+// The source triangle as the shape terms see it: total area scaled to one.
+struct SurfaceReference {
+  Vec areas;     // (m) shares of the area
+  Points cotan;  // (m, 3) cotangent of the angle at each corner
+};
+
+// \throws Error "DegenerateError" for faces without area (ids: faces).
+SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces);
+
+struct SurfaceQuality {
+  double energy = 0.0;      // mean of (s1^2 + s2^2 + s1^-2 + s2^-2) / 4 over the source's area, s
+                            // the singular values of a face's map, areas scaled to total one
+  double face_sd = 0.0;     // standard deviation of the area ratios
+  double angle_mean = 0.0;  // mean of (s1 / s2 + s2 / s1) / 2 over the source's area
+  double angle_max = 0.0;
+};
+
+// image (n, 3); areas are unsigned here.
+SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef& faces,
+                               const PointsRef& image);
+
+// Points of the torus of area one with radii ratio R / r at (u, s) in turns, s the equal-area
+// coordinate shifted by `phase` turns.
+Points torus_image(const Points2Ref& turns, double phase, double ratio);
+
+// Quality of torus_image for each candidate (phase, ratio), (k, 2), to about 1e-6.
+std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
+                                            const FacesRef& faces, const Points2Ref& turns,
+                                            const Points2Ref& candidates);
+
+}  // namespace stretchmap::area

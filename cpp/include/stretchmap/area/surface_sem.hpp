@@ -1,0 +1,56 @@
+// Stretch energy minimisation in the flat torus: Algorithm 4.1 with what cancels left out. A step
+// freezes L_S, solves (4.5) for both unit-period coordinates with one factorisation, and goes to
+// the exact minimum of E_S on the way there, never over a face.
+#pragma once
+
+#include <optional>
+
+#include "stretchmap/area/chart.hpp"
+#include "stretchmap/area/surface_pattern.hpp"
+#include "stretchmap/base/types.hpp"
+#include "stretchmap/linalg/spd_solver.hpp"
+
+namespace stretchmap::area {
+
+struct SurfaceFigures {
+  double energy = 0.0;      // E_S of shares of the area, at least 1
+  Index flips = 0;          // faces with no or negative area in the chart
+  double ring_sd = 0.0;     // standard deviation of the area ratios of vertex rings (6.3)
+  double face_sd = 0.0;     // and of faces
+  double face_error = 0.0;  // largest |ratio - 1| of a face
+  double angle_mean = 0.0;  // as in SurfaceQuality; 0 where it is not computed
+};
+
+struct SemStep {
+  double step = 0.0;      // fraction of the way to the solution of (4.5)
+  double residual = 0.0;  // norm of the gradient of E_S before the step
+};
+
+class SurfaceSem {
+ public:
+  // areas (m): source areas, scaled here to total one; aspect: length of the torus along u over
+  // that along v; turns (n, 2): where to start, faces already turned over are allowed.
+  SurfaceSem(SurfaceChart chart, const VecRef& areas, double aspect, Points2 turns);
+
+  // \throws Error "SolverError" when the factorisation breaks down.
+  SemStep step();
+
+  SurfaceFigures figures() const;
+  const Points2& turns() const { return turns_; }
+
+ private:
+  double line_search(const Points2& direction) const;
+
+  SurfaceChart chart_;
+  Vec areas_;
+  Eigen::Vector2d periods_;
+  Points2 turns_;
+  SurfacePattern pattern_;
+  std::optional<linalg::SpdSolver> solver_;  // from the first step on
+};
+
+// Fills in ring_sd, face_sd and face_error from shares of the total area (each sums to one).
+void ratio_figures(const FacesRef& faces, Index n_vertices, const VecRef& source,
+                   const VecRef& image, SurfaceFigures& figures);
+
+}  // namespace stretchmap::area

@@ -1,0 +1,40 @@
+// Which tet a point lies in: a uniform grid over a tet mesh, built once and asked many times.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::maps {
+
+struct TetLocation {
+  IndexVec tet;  // (n) tet of each point, -1 outside
+  Rows weights;  // (n, 4) barycentric coordinates, which sum to one; NaN outside
+};
+
+class TetLocator {
+ public:
+  // points (n, 3), tets (k, 4), which are copied. A point no farther than `tolerance` outside a tet
+  // counts as in it, with weights that are then slightly negative: they still reproduce the point.
+  // \pre tolerance >= 0. Tets without positive volume are never answered.
+  TetLocator(const PointsRef& points, const TetsRef& tets, double tolerance);
+
+  // Among the tets that hold a point, the first; else the one whose faces it violates least.
+  TetLocation locate(const PointsRef& queries, const Poll& poll = {}) const;
+
+ private:
+  struct Best;
+  Index cell(const Eigen::Vector3d& p) const;  // p is clamped to the grid
+  void examine(const Eigen::Vector3d& p, Index t, Best& best) const;
+
+  Points points_;
+  Tets tets_;
+  double tolerance_;
+  Eigen::Vector3d low_, high_, inverse_cell_;
+  Eigen::Array3i size_;
+  std::vector<std::int64_t> start_;  // tets of cell c: tet_[start_[c] .. start_[c + 1])
+  std::vector<Index> tet_;
+};
+
+}  // namespace stretchmap::maps

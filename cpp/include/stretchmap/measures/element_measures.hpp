@@ -1,0 +1,32 @@
+// What a piecewise-affine map does to each of its elements, in one pass: sizes before and after,
+// with sign, and the distortion of angles. Sums over vertex rings for (6.2)-(6.5).
+#pragma once
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::measures {
+
+struct ElementMeasures {
+  Vec source;     // (m) area (faces) or signed volume (tets) in the source
+  Vec image;      // (m) the same in the image, signed
+  Vec angle;      // (m) distortion of angles, >= 1 and 1 for a similarity; infinity where the image
+                  //     does not have positive size. Faces: ratio of the singular values of the
+                  //     affine map. Tets: tr(J^T J) / (3 det(J)^(2/3)).
+  Vec conformal;  // (m) faces: the face's share of the conformal energy (6.1),
+                  //     area * (s1 -+ s2)^2 / 2 with + where it is flipped; tets: empty
+};
+
+// Faces of a surface mapped by points -> image.
+// sign: (m) +1 where the image face is positively oriented, -1 where it is flipped, 0 where that
+// cannot be told apart (its image area then counts as zero).
+ElementMeasures face_measures(const PointsRef& points, const FacesRef& faces,
+                              const PointsRef& image, const VecRef& sign);
+
+// Tets mapped by points -> image; sizes are signed volumes, det(v1-v0, v2-v0, v3-v0) / 6.
+ElementMeasures tet_measures(const PointsRef& points, const TetsRef& tets, const PointsRef& image);
+
+// (n) sum of the values of the elements around each vertex, in the order of the elements.
+// elements: (m, 3) or (m, 4). \pre ids in [0, n_vertices), values of length m.
+Vec ring_sums(const Eigen::Ref<const IndexRows>& elements, const VecRef& values, Index n_vertices);
+
+}  // namespace stretchmap::measures

@@ -1,0 +1,30 @@
+// Cutting a tet mesh along a level set of a function that is linear on every tet.
+#pragma once
+
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::partitions {
+
+struct TetSplit {
+  Tets tets;        // (k') positively oriented if the input was; no tet crosses the level
+  IndexVec side;    // (k') -1 or 1, the sign of the function in the tet
+  IndexVec parent;  // (k') input tet of each tet, ascending
+  Edges cut_edges;  // (c, 2) new vertex n + i lies on this edge, lower id first,
+  Vec cut_weight;   // (c) at (1 - w) first + w second
+};
+
+// Cuts every tet along values = 0. Neighbours agree on the new vertices and on the diagonals of cut
+// faces, so the result is conforming and either side has a closed boundary.
+// values (n). A vertex closer to the level than 1e-9 of one of its edges is taken to lie on it.
+// gate (n) or empty: only the part of the level where the gate is positive is cut; a tet that the
+// rest would cut stays whole and gets the sign of its largest value.
+// \pre with a gate: no tet crosses the level on both sides of the gate.
+TetSplit split_tets(const TetsRef& tets, const VecRef& values, const VecRef& gate);
+
+// Volume where a function, linear on every tet and given at the vertices, is negative.
+// tets (k, 4), volumes (k) of the tets, values (n).
+double volume_below(const TetsRef& tets, const VecRef& volumes, const VecRef& values);
+
+}  // namespace stretchmap::partitions

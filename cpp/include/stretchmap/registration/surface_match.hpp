@@ -1,0 +1,44 @@
+// Energy of a map from one surface to another, given by where the vertices go in a chart of the
+// target: the polyhedron of the image points against the source,
+//
+//   Psi(y) = sum_f weight_f phi(K_f),  K_f = P_f(X(y)) rest_f,
+//
+// phi that of triangle_energy.hpp, P_f the edges of the image triangle in its own plane.
+#pragma once
+
+#include "stretchmap/area/chart.hpp"
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::registration {
+
+// Psi for chart positions y (n, 2) and points X (n, 3); +infinity if a face is folded in the chart.
+// rest (m, 4): inverse edge matrices as of rest_triangles; weights (m).
+double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                   const RowsRef& rest, const VecRef& weights);
+
+struct MatchModel {
+  Vec gradient;          // (2 n) by (y_0, y_1) of each vertex
+  SparseMatrix hessian;  // (2 n, 2 n), positive semi-definite
+};
+
+// Derivatives by y. What a step dy does to the edges of an image triangle is modelled in one of two
+// ways:
+//   tangent  dX = slope dy at each corner; slopes (n, 6) are row-major 3x2 matrices;
+//   chord    dP_f = S_f dE_f with the metric S_f = P_f E_f^-1 of the whole triangle, E_f its edges
+//   in
+//            the chart; slopes (0, 6). Coarser, but it sees farther than one face of the target.
+// How the metric changes along the step is left out of the Hessian.
+// \pre match_value is finite.
+MatchModel match_model(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                       const RowsRef& slopes, const RowsRef& rest, const VecRef& weights);
+
+// The same energy for the map into the plane, where the target is the flat torus itself: P_f is
+// lattice * E_f, the columns of `lattice` being the two periods.
+double flat_value(const area::SurfaceChart& chart, const Points2Ref& y,
+                  const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights);
+
+// \pre flat_value is finite.
+MatchModel flat_model(const area::SurfaceChart& chart, const Points2Ref& y,
+                      const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights);
+
+}  // namespace stretchmap::registration

@@ -1,0 +1,70 @@
+// Distortion of one tet as a function of its Jacobian J, valid for inverted tets too.
+//
+//   psi(J) = shape * (tr(J^T J) / (3 chi^(2/3)) - 1) + volume * ((det^2 J + 1) / (2 chi) - 1)
+//   chi    = (det J + sqrt(epsilon^2 + det^2 J)) / 2
+//
+// chi regularises the determinant so that the energy is finite and smooth on inverted elements and
+// turns into det J as epsilon goes to 0 (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov,
+// ACM TOG 40(4), 2021). At epsilon = 0 the first term measures shape only, the second is
+// (det + 1/det)/2 - 1: both are barriers against inversion and vanish at rotations.
+//
+// Several tets are evaluated at a time, one in each lane of the processor's vectors.
+#pragma once
+
+#include <cmath>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::volume {
+
+struct EnergyWeights {
+  double shape = 1.0;
+  double volume = 1.0;
+  double epsilon = 0.0;  // 0: barrier; the energy is infinite on inverted tets and folded faces
+  double face = 0.0;     // of the boundary triangles, where the boundary glides
+};
+
+// chi(det) and its first two derivatives.
+struct Regularised {
+  double value, first, second;
+};
+
+inline Regularised regularised(double det, double epsilon) {
+  if (epsilon <= 0.0) return {det, 1.0, 0.0};
+  const double root = std::sqrt(epsilon * epsilon + det * det);
+  // For negative det the sum of the definition cancels; this is the same number.
+  const double chi = det >= 0.0 ? 0.5 * (det + root) : 0.5 * epsilon * epsilon / (root - det);
+  return {chi, chi / root, 0.5 * epsilon * epsilon / (root * root * root)};
+}
+
+inline constexpr int kLanes = 8;
+using Lane = double[kLanes];
+
+// Tets (x0, x1, x2, x3) with J = [x1 - x0, x2 - x0, x3 - x0] * rest. Lanes that are not needed have
+// to hold a copy of one that is.
+struct ElementBatch {
+  // Input.
+  alignas(64) Lane edges[9];  // edges[3 a + i] is component i of x_{a+1} - x0
+  alignas(64) Lane rest[9];   // row-major
+  alignas(64) Lane weight;    // factor of energy, gradient and Hessian
+  // Output.
+  alignas(64) Lane energy;       // +infinity where epsilon = 0 and det J <= 0
+  alignas(64) Lane det;          // of J
+  alignas(64) Lane gradient[9];  // gradient[3 a + i]: by component i of x_{a+1}; that by x0 is
+                                 // minus their sum
+  alignas(64) Lane block[6][9];  // second derivatives by x_{a+1} (row) and x_{b+1} (column), row-
+                                 // major, for (a, b) = 00 01 02 11 12 22
+};
+
+// Fills energy and det.
+void element_values(ElementBatch& batch, const EnergyWeights& w);
+
+// Fills energy, det and gradient. \pre the energies are finite, here and below.
+void element_gradients(ElementBatch& batch, const EnergyWeights& w);
+
+// Fills all. The blocks are those of the Hessian of psi by vec(J) with its negative eigenvalues set
+// to zero, which come in closed form from the singular values (Smith, de Goes, Kim, ACM TOG 38(1),
+// 2019).
+void element_hessians(ElementBatch& batch, const EnergyWeights& w);
+
+}  // namespace stretchmap::volume

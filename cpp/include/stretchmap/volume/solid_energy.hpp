@@ -1,0 +1,100 @@
+// The distortion energy of a whole solid map, its gradient and its positive semi-definite Hessian.
+//
+//   Psi(x) = sum_t weight_t psi(J_t) + face * (energy of the gliding boundary triangles),
+//   J_t    = [x1 - x0, x2 - x0, x3 - x0] * rest_t,
+//
+// with psi of element_energy.hpp. Each vertex is free, fixed, or glides on the torus. A gliding
+// vertex has two unknowns, arc length along the two coordinate circles through it; its block is
+// written in the frame (e_u, e_v, normal) with the third unknown absent (identity row).
+//
+// Every block row is summed by one thread over its tets in a fixed order: same bits for any number
+// of threads. Rows are numbered along a space-filling curve.
+#pragma once
+
+#include <vector>
+
+#include "stretchmap/linalg/block_solver.hpp"
+#include "stretchmap/volume/boundary_barrier.hpp"
+#include "stretchmap/volume/element_energy.hpp"
+#include "stretchmap/volume/tet_laplacian.hpp"
+
+namespace stretchmap::volume {
+
+enum Motion : std::uint8_t { kFree = 0, kFixed = 1, kGliding = 2 };
+
+struct EnergyReport {
+  double energy = 0.0;  // +infinity if epsilon = 0 and a tet is inverted, or a face is folded
+  double min_det = 0.0;
+  Index flips = 0;          // tets with det J <= 0
+  double min_facing = 1.0;  // least sigma_k of the gliding faces, see boundary_barrier.hpp
+  Index folds = 0;          // faces with one that is not positive
+};
+
+class SolidEnergy {
+ public:
+  // barrier: faces whose vertices all glide; may be empty.
+  // tets (k, 4), rest (k, 9) row-major 3x3 matrices, weights (k) > 0, motion (n) of Motion values,
+  // R and r the radii of the torus (only used by gliding vertices), x (n, 3) to number rows by.
+  SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
+              const FlagsRef& motion, double R, double r, const PointsRef& x,
+              BoundaryBarrier barrier = {});
+
+  Index tets() const { return static_cast<Index>(tets_.rows()); }
+  Index rows() const { return static_cast<Index>(row_vertex_.size()); }
+  linalg::BlockMatrix pattern() const;  // of the Hessian, values zero
+
+  // From now on J is multiplied by target^(-1/3): det J = 1 where a tet has `target` times the
+  // volume the rest matrix asks for. target (k) > 0, in the order of the tets given.
+  void set_targets(const VecRef& target);
+
+  EnergyReport value(const PointsRef& x, const EnergyWeights& w) const;
+
+  // Gradient (rows, 3) and, unless null, Hessian, both in vertex frames.
+  // \pre value(x, w).energy is finite.
+  void linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+                 linalg::BlockMatrix* hessian) const;
+
+  // x moved by alpha * step (rows, 3); gliding vertices stay on the torus.
+  Points move(const PointsRef& x, const PointsRef& step, double alpha) const;
+
+  // Largest alpha <= 1 for which no tet that is positive at x turns over along the straight line
+  // of the step, times 0.9.
+  double longest_step(const PointsRef& x, const PointsRef& step) const;
+
+  // Three translations as seen from the vertex frames, (3 rows, 3).
+  Rows near_nullspace(const PointsRef& x) const;
+
+ private:
+  Eigen::Matrix3d frame(const PointsRef& x, Index vertex) const;
+  // visit(t, lane, batch) for the tets t = item(p), p in [first, last), after evaluate(batch, w).
+  template <class Item, class Visit>
+  void for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
+                   void (*evaluate)(ElementBatch&, const EnergyWeights&), const Item& item,
+                   const Visit& visit) const;
+  void build_pattern();
+  Index find_block(Index row, Index column) const;  // position in col_
+  void add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
+                   Points& gradient, double* blocks) const;
+  void add_face(const PointsRef& x, const EnergyWeights& w, Index f, Index first, Index last,
+                Points& gradient, double* blocks) const;
+  void into_frames(const PointsRef& x, Index row, Points& gradient, double* blocks) const;
+
+  Tets tets_;       // sorted by lowest row
+  IndexVec order_;  // which of the tets given each of them is
+  Vec target_;      // (k) in the sorted order; empty: ones
+  Rows rest_;
+  Vec weights_;
+  Flags motion_;
+  double R_, r_;
+  BoundaryBarrier barrier_;
+  IndexVec row_vertex_;          // vertex of each row
+  IndexVec vertex_row_;          // row of each vertex, -1 if fixed
+  IndexVec row_ptr_, col_;       // block pattern
+  IndexRows slot_;               // (k, 16) block of each pair of a tet's vertices, -1 if none
+  IndexRows face_slot_;          // (m, 9) the same of a face's vertices
+  std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
+  std::vector<std::vector<Index>> part_tets_;   // tets that touch them, ascending
+  std::vector<std::vector<Index>> part_faces_;  // and faces
+};
+
+}  // namespace stretchmap::volume

@@ -1,0 +1,70 @@
+// Projected Newton steps on the energy of a solid map.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "stretchmap/volume/solid_energy.hpp"
+
+namespace stretchmap::volume {
+
+struct NewtonOptions {
+  double tol = 1e-2;     // relative residual asked of the conjugate gradients
+  int max_cg = 300;      // more are not spent on one step
+  double armijo = 1e-4;  // demanded share of the predicted decrease
+  int max_halvings = 20;
+  // Keep the Hessian of the last step that was asked to renew it, and correct it by the changes of
+  // the gradient since (limited-memory BFGS): several times cheaper, nearly as good while the
+  // weights stay the same.
+  bool keep_hessian = false;
+};
+
+struct NewtonReport {
+  EnergyReport before, after;
+  double decrement = 0.0;  // -gradient . step, twice the decrease a quadratic model predicts
+  double gradient_norm = 0.0;
+  double alpha = 0.0;  // step length taken, 0 if no decrease was found
+  int cg_iterations = 0;
+  double cg_residual = 0.0;
+  bool negative_curvature = false;  // met by the conjugate gradients, which then stopped early
+};
+
+class SolidNewton {
+ public:
+  explicit SolidNewton(SolidEnergy energy) : energy_(std::move(energy)) {}
+
+  const SolidEnergy& energy() const { return energy_; }
+
+  // SolidEnergy::set_targets between two steps.
+  void set_targets(const VecRef& target) {
+    energy_.set_targets(target);
+    new_targets_ = true;
+  }
+
+  // One inexact Newton step from x (n, 3), which it replaces. The energy never rises, and with
+  // epsilon = 0 no tet turns over.
+  // \throws SolverError if the energy at x is not finite or the linear solve breaks down.
+  NewtonReport step(Points& x, const EnergyWeights& w, const NewtonOptions& options,
+                    const Poll& poll = {});
+
+ private:
+  void try_double_step(Points& x, const Points& start, const Points& direction,
+                       const EnergyWeights& w, NewtonReport& report) const;
+
+  struct Change {
+    Vec step, gradient;
+    double inverse;  // 1 / (step . gradient)
+  };
+
+  void renew(const PointsRef& x, const EnergyWeights& w, bool keep);
+  Points descend(const NewtonOptions& options, const Poll& poll, NewtonReport& report);
+
+  SolidEnergy energy_;
+  std::unique_ptr<linalg::BlockSolver> solver_;
+  Points gradient_;                // at the current point
+  Vec last_gradient_, last_step_;  // before the last step, and the step; empty after a renewal
+  std::vector<Change> changes_;    // since the Hessian was renewed
+  bool new_targets_ = false;       // so the change of the gradient is not that of the step alone
+};
+
+}  // namespace stretchmap::volume

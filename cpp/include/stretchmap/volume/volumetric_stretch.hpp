@@ -1,0 +1,46 @@
+// The linear solves of Algorithm 5.1: the harmonic start (step 4) and the fixed-point step (8-9).
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/volume/tet_laplacian.hpp"
+
+namespace stretchmap::volume {
+
+class VolumetricStretch {
+ public:
+  // rest_volumes (k) positive; fixed (n) marks the prescribed vertices; backend as in SpdOptions.
+  // Image and rest volumes must be on the same scale for c of (5.6) to mean the same on every mesh.
+  VolumetricStretch(const TetsRef& tets, const FlagsRef& fixed, const VecRef& rest_volumes,
+                    std::string backend);
+
+  // Replaces the free rows of x (n, 3) by the harmonic extension of the prescribed ones; the
+  // Laplacian is that of the source positions (n, 3).
+  linalg::SolveReport harmonic(const PointsRef& source, Points& x,
+                               const linalg::SolveOptions& options, const Poll& poll = {});
+
+  // One step of (5.5) with the regularisation c >= 0 of (5.6), warm-started from x.
+  linalg::SolveReport step(Points& x, double c, const linalg::SolveOptions& options,
+                           const Poll& poll = {});
+
+  // As in SpdOptions, not "auto"; empty before the first solve.
+  std::string backend() const { return solver_ ? solver_->backend() : std::string(); }
+
+ private:
+  linalg::SolveReport solve_kept(const linalg::SolveOptions& options, const Poll& poll);
+  linalg::SolveReport solve(const PointsRef& geometry, double c, Points& x,
+                            const linalg::SolveOptions& options, const Poll& poll);
+
+  TetLaplacian laplacian_;
+  std::string wanted_backend_;
+  std::unique_ptr<linalg::SpdSolver> solver_;
+  Points rhs_;
+  Rows unknowns_;
+  int solves_ = 0;    // so far
+  int fresh_ = 0;     // iterations of the first solve after the preconditioner was renewed
+  bool worn_ = true;  // whether the last solve took clearly more than that
+};
+
+}  // namespace stretchmap::volume

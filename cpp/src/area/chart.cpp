@@ -1,0 +1,68 @@
+#include "stretchmap/area/chart.hpp"
+
+#include <cmath>
+
+#include "stretchmap/base/errors.hpp"
+
+namespace stretchmap::area {
+
+SurfaceChart surface_chart(const mesh::SurfaceTopology& top, const IndexRows& forms) {
+  if (forms.rows() != 2 || forms.cols() != top.edges.rows())
+    throw Error("ArrayError", "the chart needs two 1-forms with one number per edge");
+  const Index m = static_cast<Index>(top.faces.rows());
+  SurfaceChart chart{top.n_vertices, top.faces, Faces::Zero(m, 3), Faces::Zero(m, 3)};
+  std::vector<Index> open;
+  for (int c = 0; c < 2; ++c) {
+    Faces& shift = c == 0 ? chart.shift_u : chart.shift_v;
+    for (Index f = 0; f < m; ++f) {
+      Index along[3];
+      for (int k = 0; k < 3; ++k) {
+        const Index h = 3 * f + k;
+        along[k] = static_cast<Index>(top.sign(h)) * forms(c, top.edge(h));
+      }
+      if (along[0] + along[1] + along[2] != 0) open.push_back(f);
+      shift(f, 1) = along[0];
+      shift(f, 2) = along[0] + along[1];
+    }
+  }
+  if (!open.empty()) throw Error("SolverError", "a coordinate 1-form is not closed", open);
+  return chart;
+}
+
+Vec turn_areas(const SurfaceChart& chart, const Points2Ref& turns) {
+  Vec areas(chart.faces.rows());
+  for (Index f = 0; f < areas.size(); ++f) {
+    const Eigen::Vector2d p = chart.corner(turns, f, 0);
+    const Eigen::Vector2d a = chart.corner(turns, f, 1) - p;
+    const Eigen::Vector2d b = chart.corner(turns, f, 2) - p;
+    areas(f) = 0.5 * (a.x() * b.y() - a.y() * b.x());
+  }
+  return areas;
+}
+
+Vec equal_area_from_angle(const VecRef& v, double tube_ratio) {
+  return v.array() + tube_ratio * v.array().sin();
+}
+
+Vec angle_from_equal_area(const VecRef& s, double tube_ratio) {
+  constexpr double kTwoPi = 6.283185307179586476925287;
+  Vec v(s.size());
+  for (Index i = 0; i < s.size(); ++i) {
+    const double whole = kTwoPi * std::round(s(i) / kTwoPi);
+    const double t = s(i) - whole;  // in [-pi, pi], and so is the solution
+    double low = -0.5 * kTwoPi, high = 0.5 * kTwoPi, x = t / (1.0 + tube_ratio);
+    for (int iteration = 0; iteration < 80; ++iteration) {
+      const double residual = x + tube_ratio * std::sin(x) - t;
+      (residual > 0.0 ? high : low) = x;
+      double next = x - residual / (1.0 + tube_ratio * std::cos(x));
+      if (!(next > low && next < high)) next = 0.5 * (low + high);
+      const double change = std::abs(next - x);
+      x = next;
+      if (change <= 4e-16 * (1.0 + std::abs(x))) break;
+    }
+    v(i) = x + whole;
+  }
+  return v;
+}
+
+}  // namespace stretchmap::area

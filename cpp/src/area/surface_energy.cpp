@@ -1,0 +1,241 @@
+#include "stretchmap/area/surface_energy.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "area/face_jet.hpp"
+
+namespace stretchmap::area {
+
+namespace {
+
+// A quarter of the areas' own curvature in the model: with all of it the last per cent of the area
+// ratios takes ever more steps, with none of it the steps get short.
+constexpr double kModelCurvature = 0.25;
+
+bool needs_hessian(Derivatives derivatives) {
+  return derivatives == Derivatives::kHessian || derivatives == Derivatives::kModel;
+}
+
+// Sum of half the cotangent times the squared opposite edge: |t| (s1^2 + s2^2).
+Jet dirichlet_jet(const TorusPoint (&p)[3], const Eigen::Vector3d& cotan, bool second) {
+  Jet jet;
+  for (int k = 0; k < 3; ++k) {
+    const int a = (k + 1) % 3, b = (k + 2) % 3;
+    const Eigen::Vector3d e = p[b].point - p[a].point;
+    jet.value += 0.5 * cotan(k) * e.squaredNorm();
+    jet.gradient.segment<2>(2 * a) -= cotan(k) * p[a].tangent.transpose() * e;
+    jet.gradient.segment<2>(2 * b) += cotan(k) * p[b].tangent.transpose() * e;
+    if (!second) continue;
+    jet.hessian.block<2, 2>(2 * a, 2 * a) +=
+        cotan(k) * (p[a].tangent.transpose() * p[a].tangent - p[a].curvature(e));
+    jet.hessian.block<2, 2>(2 * b, 2 * b) +=
+        cotan(k) * (p[b].tangent.transpose() * p[b].tangent + p[b].curvature(e));
+    const Eigen::Matrix2d mixed = cotan(k) * p[a].tangent.transpose() * p[b].tangent;
+    jet.hessian.block<2, 2>(2 * a, 2 * b) -= mixed;
+    jet.hessian.block<2, 2>(2 * b, 2 * a) -= mixed.transpose();
+  }
+  return jet;
+}
+
+// Area in the (u, v) chart times the density of the torus at the mean v, as a share of its area.
+Jet chart_jet(const Eigen::Vector2d (&angle)[3], double tube_ratio, bool second) {
+  constexpr double kShare = 0.5 / (4.0 * 9.869604401089358618834491);  // 1/2 over (2 pi)^2
+  const Eigen::Vector2d a = angle[1] - angle[0], b = angle[2] - angle[0];
+  const double flat = kShare * (a.x() * b.y() - a.y() * b.x());
+  const double v = (angle[0].y() + angle[1].y() + angle[2].y()) / 3.0;
+  const double density = 1.0 + tube_ratio * std::cos(v);
+  const double slope = -tube_ratio * std::sin(v) / 3.0;  // of the density by each v
+  const double bend = -tube_ratio * std::cos(v) / 9.0;
+  Jet jet;
+  jet.value = flat * density;
+  Six by_flat, by_v;  // gradients of the flat area and of the density over its slope
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector2d e = angle[(k + 2) % 3] - angle[(k + 1) % 3];
+    by_flat.segment<2>(2 * k) << -kShare * e.y(), kShare * e.x();
+    by_v.segment<2>(2 * k) << 0.0, 1.0;
+  }
+  jet.gradient = density * by_flat + flat * slope * by_v;
+  if (!second) return jet;
+  const SixSix mixed = slope * by_flat * by_v.transpose();
+  jet.hessian = mixed + mixed.transpose() + flat * bend * by_v * by_v.transpose();
+  for (int k = 0; k < 3; ++k) {
+    const int l = (k + 1) % 3;
+    const double entry = kShare * density;
+    jet.hessian(2 * k, 2 * l + 1) += entry;
+    jet.hessian(2 * l + 1, 2 * k) += entry;
+    jet.hessian(2 * k + 1, 2 * l) -= entry;
+    jet.hessian(2 * l, 2 * k + 1) -= entry;
+  }
+  return jet;
+}
+
+Eigen::Vector3d area_vector(const TorusPoint (&p)[3]) {
+  return 0.5 * (p[1].point - p[0].point).cross(p[2].point - p[0].point);
+}
+
+Eigen::Vector3d outward(const TorusPoint& p) {
+  return p.tangent.col(0).cross(p.tangent.col(1)).normalized();
+}
+
+// Component of the area vector along the torus' normal at corner k; no second derivatives.
+Jet facing_jet(const TorusPoint (&p)[3], int k) {
+  const Eigen::Vector3d area = area_vector(p), normal = outward(p[k]);
+  Jet jet;
+  jet.value = area.dot(normal);
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d by_point =
+        0.5 * (p[(i + 1) % 3].point - p[(i + 2) % 3].point).cross(normal);
+    jet.gradient.segment<2>(2 * i) = p[i].tangent.transpose() * by_point;
+  }
+  // Along a principal circle the normal turns by its normal curvature times the tangent.
+  const Eigen::Vector3d eu = p[k].tangent.col(0), ev = p[k].tangent.col(1);
+  const double bend_u = -p[k].uu.dot(normal) / eu.squaredNorm();
+  const double bend_v = -p[k].vv.dot(normal) / ev.squaredNorm();
+  jet.gradient[2 * k] += bend_u * area.dot(eu);
+  jet.gradient[2 * k + 1] += bend_v * area.dot(ev);
+  return jet;
+}
+
+// Adds weight (x + 1/x - 2), x = jet / unit. `curvature` multiplies the jet's own second
+// derivatives: 1 is exact, 0 Gauss-Newton.
+void add_barrier(const Jet& jet, double unit, double weight, double curvature, bool second,
+                 Jet& sum) {
+  const double x = jet.value / unit;
+  sum.value += weight * (x - 1.0) * (x - 1.0) / x;
+  const double slope = weight * (1.0 - 1.0 / (x * x)) / unit;
+  sum.gradient += slope * jet.gradient;
+  if (!second) return;
+  const double bend = weight * 2.0 / (x * x * x * unit * unit);
+  sum.hessian += bend * jet.gradient * jet.gradient.transpose() + curvature * slope * jet.hessian;
+}
+
+// Adds weight (d / (2 a) - 1).
+void add_shape(const Jet& d, const Jet& a, double weight, bool second, Jet& sum) {
+  const double q = 0.5 * d.value / a.value;
+  sum.value += weight * (q - 1.0);
+  const double by_d = 0.5 * weight / a.value, by_a = -weight * q / a.value;
+  sum.gradient += by_d * d.gradient + by_a * a.gradient;
+  if (!second) return;
+  const SixSix mixed = (-by_d / a.value) * d.gradient * a.gradient.transpose();
+  sum.hessian += by_d * d.hessian + by_a * a.hessian + mixed + mixed.transpose() -
+                 (2.0 * by_a / a.value) * a.gradient * a.gradient.transpose();
+}
+
+void make_convex(SixSix& matrix) {
+  const double size = matrix.diagonal().cwiseAbs().maxCoeff();
+  const SixSix shifted = matrix + 1e-12 * size * SixSix::Identity();
+  if (Eigen::LLT<SixSix>(shifted).info() == Eigen::Success) return;
+  const Eigen::SelfAdjointEigenSolver<SixSix> eigen(matrix);
+  matrix = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+           eigen.eigenvectors().transpose();
+}
+
+Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
+                const std::vector<TorusPoint>& points, const Points2Ref& angles, Index f,
+                Derivatives derivatives) {
+  const bool second = needs_hessian(derivatives);
+  const double curvature = derivatives == Derivatives::kModel ? kModelCurvature : 1.0;
+  constexpr double kTwoPi = 6.283185307179586476925287;
+  TorusPoint p[3];
+  Eigen::Vector2d angle[3];
+  for (int k = 0; k < 3; ++k) {
+    const Index i = problem.chart.faces(f, k);
+    p[k] = points[i];
+    angle[k] << angles(i, 0) + kTwoPi * problem.chart.shift_u(f, k),
+        angles(i, 1) + kTwoPi * problem.chart.shift_v(f, k);
+  }
+  const double size = problem.reference.areas(f);
+  Jet sum;
+  const Jet chart = chart_jet(angle, 1.0 / problem.ratio, second);
+  const Jet area = area_jet(p, second);
+  if (!(chart.value > 0.0 && area.value > 0.0)) {
+    sum.value = std::numeric_limits<double>::infinity();
+    return sum;
+  }
+  add_barrier(area, scale * size, weights.area * size, curvature, second, sum);
+  if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * size, 1.0, second, sum);
+  for (int k = 0; problem.facing && k < 3; ++k) {
+    const Jet facing = facing_jet(p, k);
+    if (!(facing.value > 0.0)) {
+      sum.value = std::numeric_limits<double>::infinity();
+      return sum;
+    }
+    if (weights.chart > 0.0)
+      add_barrier(facing, size, weights.chart / 3.0 * size, 0.0, second, sum);
+  }
+  if (weights.shape > 0.0)
+    add_shape(dirichlet_jet(p, problem.reference.cotan.row(f), second), area, weights.shape * size,
+              second, sum);
+  return sum;
+}
+
+}  // namespace
+
+GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
+                         const Points2Ref& angles, Derivatives derivatives) {
+  const Index m = static_cast<Index>(problem.chart.faces.rows());
+  const bool second = needs_hessian(derivatives);
+  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  Vec values(m);
+  Rows gradients(derivatives == Derivatives::kNone ? 0 : m, 6);
+  GlideEnergy energy;
+  if (second) energy.hessians.resize(m, 36);
+#pragma omp parallel for schedule(static)
+  for (Index f = 0; f < m; ++f) {
+    Jet jet = face_energy(problem, weights, scale, points, angles, f, derivatives);
+    values(f) = jet.value;
+    if (gradients.rows() > 0) gradients.row(f) = jet.gradient;
+    if (!second) continue;
+    if (derivatives == Derivatives::kModel) make_convex(jet.hessian);
+    Eigen::Map<SixSix>(energy.hessians.row(f).data()) = jet.hessian;
+  }
+  energy.value = values.sum();
+  if (gradients.rows() > 0) {
+    energy.gradient = Vec::Zero(angles.size());
+    for (Index f = 0; f < m; ++f)
+      for (int k = 0; k < 3; ++k)
+        energy.gradient.segment<2>(2 * problem.chart.faces(f, k)) +=
+            gradients.row(f).segment<2>(2 * k).transpose();
+  }
+  return energy;
+}
+
+Points glide_image(const GlideProblem& problem, const Points2Ref& angles) {
+  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  Points image(angles.rows(), 3);
+  for (Index i = 0; i < static_cast<Index>(image.rows()); ++i) image.row(i) = points[i].point;
+  return image;
+}
+
+bool all_facing(const GlideProblem& problem, const Points2Ref& angles) {
+  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  for (Index f = 0; f < problem.chart.faces.rows(); ++f) {
+    TorusPoint p[3];
+    for (int k = 0; k < 3; ++k) p[k] = points[problem.chart.faces(f, k)];
+    for (int k = 0; k < 3; ++k)
+      if (!(area_vector(p).dot(outward(p[k])) > 0.0)) return false;
+  }
+  return true;
+}
+
+Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles) {
+  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  Vec areas(problem.chart.faces.rows());
+  for (Index f = 0; f < areas.size(); ++f) {
+    const Eigen::Vector3d p = points[problem.chart.faces(f, 0)].point;
+    const Eigen::Vector3d a = points[problem.chart.faces(f, 1)].point - p;
+    const Eigen::Vector3d b = points[problem.chart.faces(f, 2)].point - p;
+    areas(f) = 0.5 * a.cross(b).norm();
+  }
+  return areas;
+}
+
+double best_scale(const GlideProblem& problem, const Points2Ref& angles) {
+  const Vec areas = glide_areas(problem, angles);
+  const Vec& source = problem.reference.areas;
+  return std::sqrt(areas.sum() / (source.array().square() / areas.array()).sum());
+}
+
+}  // namespace stretchmap::area

@@ -1,0 +1,172 @@
+#include "linalg/krylov/pcg.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "stretchmap/base/parallel.hpp"
+
+namespace stretchmap::linalg {
+namespace {
+
+template <int K>
+using Scalars = std::array<double, K>;
+
+template <int K, class Real>
+Scalars<K> dots(Index n, const double* a, const Real* b) {
+  return sum_chunks<K>(n, [&](Index begin, Index end, Scalars<K>& sums) {
+    for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
+      for (int k = 0; k < K; ++k) sums[k] += a[K * i + k] * b[K * i + k];
+  });
+}
+
+// r = b - q, in both precisions; returns |r|^2.
+template <int K>
+Scalars<K> residual_from(Index n, const double* b, const double* q, double* r, float* r_f) {
+  return sum_chunks<K>(n, [&](Index begin, Index end, Scalars<K>& sums) {
+    for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
+      for (int k = 0; k < K; ++k) {
+        const double value = b[K * i + k] - q[K * i + k];
+        r[K * i + k] = value;
+        r_f[K * i + k] = static_cast<float>(value);
+        sums[k] += value * value;
+      }
+  });
+}
+
+// x += alpha p, r -= alpha q, returns |r|^2.
+template <int K>
+Scalars<K> advance(Index n, const Scalars<K>& alpha, const double* p, const double* q, double* x,
+                   double* r, float* r_f) {
+  return sum_chunks<K>(n, [&](Index begin, Index end, Scalars<K>& sums) {
+    for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
+      for (int k = 0; k < K; ++k) {
+        x[K * i + k] += alpha[k] * p[K * i + k];
+        const double value = r[K * i + k] - alpha[k] * q[K * i + k];
+        r[K * i + k] = value;
+        r_f[K * i + k] = static_cast<float>(value);
+        sums[k] += value * value;
+      }
+  });
+}
+
+// p = z + beta p
+template <int K>
+void turn(Index n, const Scalars<K>& beta, const float* z, double* p) {
+  for_chunks(n, [&](Index begin, Index end) {
+    for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
+      for (int k = 0; k < K; ++k) p[K * i + k] = z[K * i + k] + beta[k] * p[K * i + k];
+  });
+}
+
+template <int K>
+bool all_finite(const Scalars<K>& values) {
+  for (double value : values)
+    if (!std::isfinite(value)) return false;
+  return true;
+}
+
+// What one run of conjugate gradients needs to go on.
+template <int K>
+struct Run {
+  const PcgSystem<K>& system;
+  const double* b;
+  double* x;
+  std::vector<double>&r, &p, &q;
+  std::vector<float>&r_f, &z;
+  Scalars<K> goal{};  // squared residual aimed at
+  Scalars<K> rr{};
+  PcgResult<K> result{};
+
+  bool reached() const {
+    for (int k = 0; k < K; ++k)
+      if (!(rr[k] <= goal[k])) return false;
+    return true;
+  }
+
+  void true_residual() {
+    system.apply(x, q.data());
+    rr = residual_from<K>(system.n, b, q.data(), r.data(), r_f.data());
+    result.finite = result.finite && all_finite<K>(rr);
+  }
+
+  // Steps until the recursive residual is at the goal, the budget is spent or something breaks.
+  void iterate(int max_iter, const Poll& poll) {
+    Scalars<K> rz_old{};
+    const Index n = system.n;
+    for (bool first = true; result.iterations < max_iter && !reached(); first = false) {
+      if (poll) poll();
+      system.precondition(r_f.data(), z.data());
+      const Scalars<K> rz = dots<K>(n, r.data(), z.data());
+      if (!(result.finite = all_finite<K>(rz))) return;
+      Scalars<K> beta{};
+      for (int k = 0; k < K; ++k) beta[k] = first || rz_old[k] == 0.0 ? 0.0 : rz[k] / rz_old[k];
+      turn<K>(n, beta, z.data(), p.data());
+      const Scalars<K> pq = system.apply(p.data(), q.data());
+      if (!(result.finite = all_finite<K>(pq))) return;
+      Scalars<K> alpha{};
+      for (int k = 0; k < K; ++k) {
+        if (rr[k] <= goal[k]) continue;  // this column is done and rests
+        if (pq[k] <= 0.0 || rz[k] <= 0.0) {
+          result.negative_curvature = true;
+          alpha = {};
+          // At the very first step there is no iterate to keep: the preconditioned gradient.
+          if (result.iterations == 0 && rz[k] > 0.0) alpha[k] = 1.0;
+          advance<K>(n, alpha, p.data(), q.data(), x, r.data(), r_f.data());
+          return;
+        }
+        alpha[k] = rz[k] / pq[k];
+      }
+      rr = advance<K>(n, alpha, p.data(), q.data(), x, r.data(), r_f.data());
+      if (!(result.finite = all_finite<K>(rr))) return;
+      rz_old = rz;
+      ++result.iterations;
+    }
+  }
+};
+
+}  // namespace
+
+template <int K>
+PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVectors& vectors,
+                 const SolveOptions& options, const Poll& poll) {
+  const Index n = system.n;
+  const std::size_t size = static_cast<std::size_t>(n) * K;
+  const Scalars<K> bb = dots<K>(n, b, b);
+  Run<K> run{system, b, x, vectors.r, vectors.p, vectors.q, vectors.r_f, vectors.z};
+  run.p.assign(size, 0.0);
+  for (std::vector<double>* vector : {&run.r, &run.q}) vector->resize(size);
+  for (std::vector<float>* vector : {&run.r_f, &run.z}) vector->resize(size);
+  if (!(run.result.finite = all_finite<K>(bb))) return run.result;
+  for (int k = 0; k < K; ++k) {
+    run.goal[k] = options.tol * options.tol * bb[k];
+    if (bb[k] == 0.0)
+      for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) x[K * i + k] = 0.0;
+  }
+  // The recursive residual drifts from the true one; a restart from the true one closes the gap.
+  run.true_residual();
+  const Scalars<K> first = run.rr;
+  for (int restart = 0; restart < 4 && run.result.finite && !run.reached(); ++restart) {
+    const int before = run.result.iterations;
+    run.iterate(options.max_iter, poll);
+    if (!run.result.finite) break;
+    run.true_residual();
+    if (run.result.negative_curvature || run.result.iterations == before) break;
+  }
+  run.result.digits = std::numeric_limits<double>::max();
+  for (int k = 0; k < K; ++k) {
+    run.result.residual[k] = bb[k] > 0.0 ? std::sqrt(run.rr[k] / bb[k]) : 0.0;
+    if (first[k] > run.goal[k] && run.rr[k] > 0.0)
+      run.result.digits = std::min(run.result.digits, 0.5 * std::log10(first[k] / run.rr[k]));
+  }
+  return run.result;
+}
+
+template PcgResult<1> pcg<1>(const PcgSystem<1>&, const double*, double*, PcgVectors&,
+                             const SolveOptions&, const Poll&);
+template PcgResult<2> pcg<2>(const PcgSystem<2>&, const double*, double*, PcgVectors&,
+                             const SolveOptions&, const Poll&);
+template PcgResult<4> pcg<4>(const PcgSystem<4>&, const double*, double*, PcgVectors&,
+                             const SolveOptions&, const Poll&);
+
+}  // namespace stretchmap::linalg

@@ -1,0 +1,197 @@
+#include "linalg/multigrid/multigrid.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace stretchmap::linalg {
+namespace {
+
+using std::size_t;
+
+constexpr Index kCoarsest = 150;  // unknowns that are inverted densely
+constexpr Index kLargest = 3000;  // more are not, even if coarsening stalls
+constexpr double kThreshold = 0.1;
+
+}  // namespace
+
+void DenseInverse::set(const Pattern& pattern, const std::vector<double>& values, int block) {
+  n_ = pattern.rows() * block;
+  inverse_.clear();
+  if (n_ > kLargest) return;
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(n_, n_);
+  for (Index i = 0; i < pattern.rows(); ++i)
+    for (Index e = pattern.start[i]; e < pattern.start[i + 1]; ++e)
+      for (int r = 0; r < block; ++r)
+        for (int c = 0; c < block; ++c)
+          dense(i * block + r, pattern.col[e] * block + c) =
+              values[static_cast<size_t>(block * block) * e + block * r + c];
+  const Eigen::LLT<Eigen::MatrixXd> llt(dense);
+  Eigen::MatrixXd inverse;
+  if (llt.info() == Eigen::Success) {
+    inverse = llt.solve(Eigen::MatrixXd::Identity(n_, n_));
+  } else {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(dense);
+    const Eigen::VectorXd size = eigen.eigenvalues().cwiseAbs();
+    const double floor = std::max(1e-8 * size.maxCoeff(), 1e-300);
+    inverse = eigen.eigenvectors() * size.cwiseMax(floor).cwiseInverse().asDiagonal() *
+              eigen.eigenvectors().transpose();
+  }
+  const Eigen::MatrixXf symmetric = (0.5 * (inverse + inverse.transpose())).cast<float>();
+  inverse_.assign(symmetric.data(), symmetric.data() + symmetric.size());
+}
+
+template <int N>
+void DenseInverse::apply(const float* b, float* x) const {
+  std::fill_n(x, static_cast<size_t>(N) * n_, 0.0f);
+  if (inverse_.empty()) return;
+  for_chunks(
+      n_,
+      [&](Index begin, Index end) {
+        for (Index j = 0; j < n_; ++j) {
+          const float* column = inverse_.data() + static_cast<size_t>(n_) * j;
+          for (size_t i = begin; i < static_cast<size_t>(end); ++i)
+            for (int k = 0; k < N; ++k)
+              x[N * i + k] += column[i] * b[static_cast<size_t>(N) * j + k];
+        }
+      },
+      kChunk / 16);
+}
+
+template <int B, int K>
+void Level<B, K>::set_transfer(bool fresh) {
+  if constexpr (B == 1) {
+    // The filtered matrix has no positive off-diagonal entry: its scaled spectrum ends below 2.
+    transfer.damping = 0.75;
+  } else {
+    // The largest eigenvalue of D^-1 A by the power method, a little enlarged.
+    const size_t size = static_cast<size_t>(B) * A.n;
+    if (fresh) {
+      probe.resize(size);
+      std::uint32_t state = 1;
+      for (float& value : probe) {
+        state = state * 1664525u + 1013904223u;
+        value = static_cast<float>(state >> 8) / (1u << 24) - 0.5f;
+      }
+    }
+    std::vector<float> image(size);
+    double eigenvalue = 1.0;
+    for (int step = 0; step < (fresh ? 12 : 3); ++step) {
+      const auto norm = [&](const std::vector<float>& v) {
+        return std::sqrt(sum_chunks<1>(static_cast<Index>(size),
+                                       [&](Index begin, Index end, std::array<double, 1>& sum) {
+                                         for (Index i = begin; i < end; ++i)
+                                           sum[0] += static_cast<double>(v[i]) * v[i];
+                                       })[0]);
+      };
+      A.scaled_multiply(probe.data(), image.data());
+      const double before = norm(probe), after = norm(image);
+      if (!(before > 0.0 && after > 0.0)) break;
+      eigenvalue = after / before;
+      const float scale = static_cast<float>(1.0 / after);
+      for (size_t i = 0; i < size; ++i) probe[i] = scale * image[i];
+    }
+    transfer.damping = 4.0 / 3.0 / std::max(1.0, 1.05 * eigenvalue);
+  }
+  transfer.set_values(A);
+}
+
+template <int B, int K>
+template <int N>
+void Level<B, K>::descend(const float* right_hand_side, std::vector<float>& coarse_b) {
+  const size_t size = static_cast<size_t>(B) * N * A.n;
+  smooth.resize(size);
+  work.resize(size);
+  coarse_b.resize(static_cast<size_t>(K) * N * transfer.aggregates.count);
+  A.template sweep_forward<N>(right_hand_side, smooth.data(), work.data());
+  transfer.template restrict_to<N>(work.data(), coarse_b.data());
+}
+
+template <int B, int K>
+template <int N>
+void Level<B, K>::ascend(const float* right_hand_side, const std::vector<float>& coarse_x,
+                         float* out) {
+  transfer.template prolong_add<N>(coarse_x.data(), smooth.data(), work.data());
+  A.template sweep_backward<N>(right_hand_side, work.data(), out);
+}
+
+template <int B, int K>
+void Multigrid<B, K>::setup(const std::vector<double>& modes) {
+  coarse_.clear();
+  std::vector<double> next_modes = finest_.transfer.setup(finest_.A, modes, kThreshold);
+  finest_.set_transfer(true);
+  std::vector<double> values = finest_.transfer.coarse_values(finest_.A);
+  Index fine_rows = finest_.A.n;
+  const Pattern* pattern = &finest_.transfer.coarse;
+  while (pattern->rows() * K > kCoarsest && pattern->rows() < 0.8 * fine_rows) {
+    fine_rows = pattern->rows();
+    Level<K, K> level;
+    level.A.set_pattern(fine_rows, pattern->start.data(), pattern->col.data(), {});
+    level.A.set_values(values.data());
+    next_modes = level.transfer.setup(level.A, next_modes, kThreshold);
+    level.set_transfer(true);
+    values = level.transfer.coarse_values(level.A);
+    coarse_.push_back(std::move(level));
+    pattern = &coarse_.back().transfer.coarse;
+  }
+  last_pattern_ = *pattern;
+  last_.set(last_pattern_, values, K);
+}
+
+template <int B, int K>
+void Multigrid<B, K>::refresh() {
+  finest_.set_transfer(false);
+  std::vector<double> values = finest_.transfer.coarse_values(finest_.A);
+  for (Level<K, K>& level : coarse_) {
+    level.A.set_values(values.data());
+    level.set_transfer(false);
+    values = level.transfer.coarse_values(level.A);
+  }
+  last_.set(last_pattern_, values, K);
+}
+
+template <int B, int K>
+template <int N>
+void Multigrid<B, K>::precondition(const float* r, float* z) {
+  const auto right_hand_side = [&](size_t level) -> std::vector<float>& {
+    return level < coarse_.size() ? coarse_[level].b : last_b_;
+  };
+  finest_.template descend<N>(r, right_hand_side(0));
+  for (size_t level = 0; level < coarse_.size(); ++level)
+    coarse_[level].template descend<N>(coarse_[level].b.data(), right_hand_side(level + 1));
+  last_x_.resize(last_b_.size());
+  last_.apply<N>(last_b_.data(), last_x_.data());
+  const std::vector<float>* below = &last_x_;
+  for (size_t level = coarse_.size(); level-- > 0; below = &coarse_[level].x) {
+    coarse_[level].x.resize(coarse_[level].b.size());
+    coarse_[level].template ascend<N>(coarse_[level].b.data(), *below, coarse_[level].x.data());
+  }
+  finest_.template ascend<N>(r, *below, z);
+}
+
+template <int B, int K>
+std::vector<Index> Multigrid<B, K>::level_sizes() const {
+  std::vector<Index> sizes{finest_.A.n};
+  for (const Level<K, K>& level : coarse_) sizes.push_back(level.A.n);
+  sizes.push_back(last_pattern_.rows());
+  return sizes;
+}
+
+template <int B, int K>
+double Multigrid<B, K>::operator_complexity() const {
+  const double finest = static_cast<double>(B * B) * (finest_.A.col.size() + finest_.A.n);
+  double all = finest + static_cast<double>(K * K) * last_pattern_.col.size();
+  for (const Level<K, K>& level : coarse_)
+    all += static_cast<double>(K * K) * (level.A.col.size() + level.A.n);
+  return all / finest;
+}
+
+template class Multigrid<1, 1>;
+template void Multigrid<1, 1>::precondition<1>(const float*, float*);
+template void Multigrid<1, 1>::precondition<2>(const float*, float*);
+template void Multigrid<1, 1>::precondition<4>(const float*, float*);
+template class Multigrid<3, 3>;
+template void Multigrid<3, 3>::precondition<1>(const float*, float*);
+template class Multigrid<3, 6>;
+template void Multigrid<3, 6>::precondition<1>(const float*, float*);
+
+}  // namespace stretchmap::linalg

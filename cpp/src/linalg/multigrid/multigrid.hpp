@@ -1,0 +1,70 @@
+// Smoothed-aggregation multigrid: one V-cycle in single precision as a preconditioner.
+#pragma once
+
+#include <vector>
+
+#include "linalg/multigrid/level_matrix.hpp"
+#include "linalg/multigrid/transfer.hpp"
+
+namespace stretchmap::linalg {
+
+// The coarsest matrix, inverted.
+class DenseInverse {
+ public:
+  // A in compressed rows with B x B blocks; a matrix that is not positive definite is replaced by
+  // the one with the absolute values of its eigenvalues.
+  void set(const Pattern& pattern, const std::vector<double>& values, int block);
+  template <int N>
+  void apply(const float* b, float* x) const;
+
+ private:
+  Index n_ = 0;
+  std::vector<float> inverse_;
+};
+
+template <int B, int K>
+struct Level {
+  LevelMatrix<B> A;
+  Transfer<B, K> transfer;
+  std::vector<float> b, x;          // right-hand side and correction, used below the finest level
+  std::vector<float> smooth, work;  // after the first sweep; residual, then corrected
+  std::vector<float> probe;         // approximate eigenvector of D^-1 A
+
+  // Renews the transfer's numbers; `fresh`: the damping is estimated from scratch.
+  void set_transfer(bool fresh);
+  template <int N>
+  void descend(const float* right_hand_side, std::vector<float>& coarse_b);
+  template <int N>
+  void ascend(const float* right_hand_side, const std::vector<float>& coarse_x, float* out);
+};
+
+// B unknowns per row on the finest level, K (near-nullspace modes) on the others.
+template <int B, int K>
+class Multigrid {
+ public:
+  // The finest matrix; its values are set before setup and refresh.
+  LevelMatrix<B>& finest() { return finest_.A; }
+  const LevelMatrix<B>& finest() const { return finest_.A; }
+
+  // modes (n B K): near-nullspace in the finest matrix's numbering.
+  void setup(const std::vector<double>& modes);
+  // New values on the old aggregates and patterns.
+  void refresh();
+
+  // z = M r for N interleaved columns; M symmetric positive definite up to rounding.
+  template <int N>
+  void precondition(const float* r, float* z);
+
+  std::vector<Index> level_sizes() const;  // block rows, finest first, coarsest last
+  double operator_complexity() const;      // numbers stored on all levels over the finest's
+
+ private:
+  void set_values(bool fresh);
+  Level<B, K> finest_;
+  std::vector<Level<K, K>> coarse_;
+  Pattern last_pattern_;
+  DenseInverse last_;
+  std::vector<float> last_b_, last_x_;
+};
+
+}  // namespace stretchmap::linalg

@@ -1,0 +1,130 @@
+#include "stretchmap/registration/surface_match.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "stretchmap/registration/triangle_energy.hpp"
+
+namespace stretchmap::registration {
+namespace {
+
+Eigen::Matrix2d chart_edges(const area::SurfaceChart& chart, const Points2Ref& y, Index f) {
+  const Eigen::Vector2d origin = chart.corner(y, f, 0);
+  Eigen::Matrix2d edges;
+  edges << chart.corner(y, f, 1) - origin, chart.corner(y, f, 2) - origin;
+  return edges;
+}
+
+// Edges of the image triangle in its own plane, the first along x.
+Eigen::Matrix2d plane_edges(const area::SurfaceChart& chart, const PointsRef& X, Index f) {
+  const Eigen::RowVector3d a = X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0));
+  const Eigen::RowVector3d b = X.row(chart.faces(f, 2)) - X.row(chart.faces(f, 0));
+  const double base = a.norm();
+  Eigen::Matrix2d edges;
+  edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
+  return edges;
+}
+
+Eigen::Matrix2d rest_of(const RowsRef& rest, Index f) {
+  Eigen::Matrix2d matrix;
+  matrix << rest(f, 0), rest(f, 1), rest(f, 2), rest(f, 3);
+  return matrix;
+}
+
+// Derivatives of phi for one face, given what a unit step of each corner's chart coordinates does
+// to the edges of the image triangle.
+struct FaceModel {
+  Eigen::Matrix<double, 6, 1> gradient;
+  Eigen::Matrix<double, 6, 6> hessian;
+};
+
+template <typename SlopeOfCorner>
+FaceModel face_model(const Eigen::Matrix2d& P, const Eigen::Matrix2d& R,
+                     const SlopeOfCorner& slope) {
+  Eigen::Matrix2d stress;
+  Matrix4 curvature;
+  triangle_energy(P * R, stress, curvature);
+  Eigen::Matrix<double, 3, 2> G;
+  G << 0.0, 0.0, R(0, 0), R(0, 1), R(1, 0), R(1, 1);
+  G.row(0) = -(G.row(1) + G.row(2));
+  Eigen::Matrix<double, 4, 6> D;  // of vec(K) by the chart coordinates of the corners
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 2; ++k) D.block<2, 2>(2 * k, 2 * c) = slope(c) * G(c, k);
+  const Eigen::Map<const Eigen::Vector4d> flat(stress.data());
+  return {D.transpose() * flat, D.transpose() * curvature * D};
+}
+
+// Sum over the faces; model_of(f) is a face's share without its weight.
+template <typename ModelOfFace>
+MatchModel assemble(const area::SurfaceChart& chart, const VecRef& weights,
+                    const ModelOfFace& model_of) {
+  const Index n = chart.n_vertices, m = static_cast<Index>(chart.faces.rows());
+  MatchModel model{Vec::Zero(2 * n), SparseMatrix(2 * n, 2 * n)};
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  entries.reserve(36 * static_cast<std::size_t>(m));
+  for (Index f = 0; f < m; ++f) {
+    const FaceModel face = model_of(f);
+    for (int p = 0; p < 6; ++p) {
+      const Index row = 2 * chart.faces(f, p / 2) + p % 2;
+      model.gradient[row] += weights[f] * face.gradient[p];
+      for (int q = 0; q < 6; ++q)
+        entries.emplace_back(row, 2 * chart.faces(f, q / 2) + q % 2,
+                             weights[f] * face.hessian(p, q));
+    }
+  }
+  model.hessian.setFromTriplets(entries.begin(), entries.end());
+  return model;
+}
+
+}  // namespace
+
+double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                   const RowsRef& rest, const VecRef& weights) {
+  double total = 0.0;
+  for (Index f = 0; f < chart.faces.rows(); ++f) {
+    if (!(chart_edges(chart, y, f).determinant() > 0.0))
+      return std::numeric_limits<double>::infinity();
+    total += weights[f] * triangle_energy(plane_edges(chart, X, f) * rest_of(rest, f));
+  }
+  return total;
+}
+
+MatchModel match_model(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                       const RowsRef& slopes, const RowsRef& rest, const VecRef& weights) {
+  return assemble(chart, weights, [&](Index f) {
+    const Eigen::Matrix2d P = plane_edges(chart, X, f), R = rest_of(rest, f);
+    if (slopes.rows() == 0) {
+      const Eigen::Matrix2d S = P * chart_edges(chart, y, f).inverse();
+      return face_model(P, R, [&](int) { return S; });
+    }
+    const Eigen::Vector3d a = (X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0))).transpose();
+    const Eigen::Vector3d b = (X.row(chart.faces(f, 2)) - X.row(chart.faces(f, 0))).transpose();
+    Eigen::Matrix<double, 3, 2> frame;
+    frame.col(0) = a.normalized();
+    frame.col(1) = (b - b.dot(frame.col(0)) * frame.col(0)).normalized();
+    return face_model(P, R, [&](int c) -> Eigen::Matrix2d {
+      const auto row = slopes.row(chart.faces(f, c));
+      Eigen::Matrix<double, 3, 2> J;
+      J << row[0], row[1], row[2], row[3], row[4], row[5];
+      return frame.transpose() * J;
+    });
+  });
+}
+
+double flat_value(const area::SurfaceChart& chart, const Points2Ref& y,
+                  const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights) {
+  double total = 0.0;
+  for (Index f = 0; f < chart.faces.rows(); ++f)
+    total += weights[f] * triangle_energy(lattice * chart_edges(chart, y, f) * rest_of(rest, f));
+  return total;
+}
+
+MatchModel flat_model(const area::SurfaceChart& chart, const Points2Ref& y,
+                      const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights) {
+  return assemble(chart, weights, [&](Index f) {
+    const Eigen::Matrix2d P = lattice * chart_edges(chart, y, f);
+    return face_model(P, rest_of(rest, f), [&](int) { return lattice; });
+  });
+}
+
+}  // namespace stretchmap::registration

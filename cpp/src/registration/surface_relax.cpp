@@ -1,0 +1,121 @@
+#include "stretchmap/registration/surface_relax.hpp"
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "stretchmap/registration/triangle_energy.hpp"
+
+namespace stretchmap::registration {
+namespace {
+
+constexpr int kDirections = 8;
+
+// Faces round each vertex.
+struct Rings {
+  explicit Rings(const area::SurfaceChart& chart)
+      : start(chart.n_vertices + 1, 0), face(chart.faces.size()) {
+    const Index m = static_cast<Index>(chart.faces.rows());
+    for (Index f = 0; f < m; ++f)
+      for (int k = 0; k < 3; ++k) ++start[chart.faces(f, k) + 1];
+    for (Index i = 0; i < chart.n_vertices; ++i) start[i + 1] += start[i];
+    std::vector<Index> cursor(start.begin(), start.end() - 1);
+    for (Index f = 0; f < m; ++f)
+      for (int k = 0; k < 3; ++k) face[cursor[chart.faces(f, k)]++] = f;
+  }
+  std::vector<Index> start, face;
+};
+
+double face_value(const area::SurfaceChart& chart, const Points2& y, const Points& X,
+                  const RowsRef& rest, Index f) {
+  const Eigen::Vector2d origin = chart.corner(y, f, 0);
+  Eigen::Matrix2d flat;
+  flat << chart.corner(y, f, 1) - origin, chart.corner(y, f, 2) - origin;
+  if (!(flat.determinant() > 0.0)) return std::numeric_limits<double>::infinity();
+  const Eigen::RowVector3d a = X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0));
+  const Eigen::RowVector3d b = X.row(chart.faces(f, 2)) - X.row(chart.faces(f, 0));
+  const double base = a.norm();
+  Eigen::Matrix2d edges, rest_edges;
+  edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
+  rest_edges << rest(f, 0), rest(f, 1), rest(f, 2), rest(f, 3);
+  return triangle_energy(edges * rest_edges);
+}
+
+class Search {
+ public:
+  Search(const area::SurfaceChart& chart, const SurfaceWalk& target, const RowsRef& rest,
+         const VecRef& weights, Points2& y, Points& X)
+      : chart_(chart),
+        target_(target),
+        rest_(rest),
+        weights_(weights),
+        y_(y),
+        X_(X),
+        rings_(chart) {}
+
+  // Tries one vertex; returns by how much the energy fell, 0 if it stays.
+  double improve(Index i, double reach) {
+    const double before = ring_value(i);
+    const Eigen::RowVector2d y = y_.row(i);
+    const Eigen::RowVector3d X = X_.row(i);
+    double best = before;
+    Eigen::RowVector2d best_y = y;
+    Eigen::RowVector3d best_X = X;
+    const Eigen::Matrix2d steps = target_.steps(y);
+    for (int d = 0; d < kDirections; ++d) {
+      const double angle = 2.0 * M_PI * d / kDirections;
+      const Eigen::Vector2d way(std::cos(angle), std::sin(angle));
+      y_.row(i) = y + (reach * steps * way).transpose();
+      Eigen::RowVector3d there;
+      if (!target_.point(y_.row(i), there)) continue;
+      X_.row(i) = there;
+      const double value = ring_value(i);
+      if (value < best) best = value, best_y = y_.row(i), best_X = X_.row(i);
+    }
+    y_.row(i) = best_y;
+    X_.row(i) = best_X;
+    return before - best;
+  }
+
+ private:
+  double ring_value(Index i) const {
+    double total = 0.0;
+    for (Index p = rings_.start[i]; p < rings_.start[i + 1]; ++p) {
+      const Index f = rings_.face[p];
+      total += weights_[f] * face_value(chart_, y_, X_, rest_, f);
+      if (!std::isfinite(total)) return std::numeric_limits<double>::infinity();
+    }
+    return total;
+  }
+
+  const area::SurfaceChart& chart_;
+  const SurfaceWalk& target_;
+  const RowsRef& rest_;
+  const VecRef& weights_;
+  Points2& y_;
+  Points& X_;
+  Rings rings_;
+};
+
+}  // namespace
+
+RelaxReport relax_match(const area::SurfaceChart& chart, const SurfaceWalk& target,
+                        const RowsRef& rest, const VecRef& weights, const FlagsRef& held,
+                        int sweeps, Points2& y, Points& X, Vec& reach, const Poll& poll) {
+  Search search(chart, target, rest, weights, y, X);
+  Reach lengths(reach);
+  RelaxReport report;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    for (Index i = 0; i < chart.n_vertices; ++i) {
+      if (poll && i % 64 == 0) poll();
+      if (held[i]) continue;
+      const double gain = search.improve(i, lengths[i]);
+      lengths.update(i, gain > 0.0);
+      report.gain += gain;
+      report.moved += gain > 0.0;
+    }
+  }
+  return report;
+}
+
+}  // namespace stretchmap::registration

@@ -1,0 +1,312 @@
+#include "stretchmap/volume/solid_energy.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace stretchmap::volume {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::RowVector3d;
+using Eigen::Vector3d;
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using Block = Eigen::Map<RowMatrix3d>;
+
+// Sum in blocks of fixed size: the result does not depend on the number of threads.
+double blocked_sum(const Vec& values) {
+  constexpr Index kBlock = 4096;
+  const Index n = static_cast<Index>(values.size());
+  double sum = 0.0;
+  for (Index first = 0; first < n; first += kBlock)
+    sum += values.segment(first, std::min(kBlock, n - first)).sum();
+  return sum;
+}
+
+// to += block, two numbers at a time.
+void add_block(const RowMatrix3d& block, double* to) {
+  using Eight = Eigen::Array<double, 8, 1>;
+  Eigen::Map<Eight> head(to);
+  head += Eigen::Map<const Eight>(block.data());
+  to[8] += block(2, 2);
+}
+
+// Smallest root in (0, limit] of d0 + d1 a + d2 a^2 + d3 a^3 with d0 > 0; limit if there is none.
+double first_root(double d0, double d1, double d2, double d3, double limit) {
+  const auto p = [&](double a) { return d0 + a * (d1 + a * (d2 + a * d3)); };
+  // Bernstein coefficients on [0, limit]: all positive means no root.
+  const double b1 = d0 + d1 * limit / 3.0;
+  const double b2 = d0 + 2.0 * d1 * limit / 3.0 + d2 * limit * limit / 3.0;
+  if (b1 > 0 && b2 > 0 && p(limit) > 0) return limit;
+  // March with a Lipschitz bound of the derivative: never steps over a root.
+  const double bound = std::abs(d1) + limit * (2.0 * std::abs(d2) + 3.0 * limit * std::abs(d3));
+  double a = 0.0;
+  for (int k = 0; k < 64; ++k) {
+    const double value = p(a);
+    if (value <= 1e-3 * d0) return a;
+    a += value / bound;
+    if (a >= limit) return limit;
+  }
+  return a;
+}
+
+}  // namespace
+
+template <class Item, class Visit>
+void SolidEnergy::for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
+                              void (*evaluate)(ElementBatch&, const EnergyWeights&),
+                              const Item& item, const Visit& visit) const {
+  ElementBatch batch;
+  for (Index begin = first; begin < last; begin += kLanes) {
+    for (int l = 0; l < kLanes; ++l) {
+      const Index t = item(std::min(begin + l, last - 1));
+      const double* origin = x.data() + 3 * static_cast<std::ptrdiff_t>(tets_(t, 0));
+      for (int a = 0; a < 3; ++a) {
+        const double* corner = x.data() + 3 * static_cast<std::ptrdiff_t>(tets_(t, a + 1));
+        for (int i = 0; i < 3; ++i) batch.edges[3 * a + i][l] = corner[i] - origin[i];
+      }
+      for (int k = 0; k < 9; ++k) batch.rest[k][l] = rest_(t, k);
+      batch.weight[l] = weights_[t];
+    }
+    evaluate(batch, w);
+    for (int l = 0; l < kLanes && begin + l < last; ++l) visit(item(begin + l), l, batch);
+  }
+}
+
+void SolidEnergy::set_targets(const VecRef& target) {
+  const Index k = static_cast<Index>(tets_.rows());
+  if (target_.size() == 0) target_.setOnes(k);
+  for (Index t = 0; t < k; ++t) {
+    const double wanted = target[order_[t]];
+    rest_.row(t) *= std::cbrt(target_[t] / wanted);
+    target_[t] = wanted;
+  }
+}
+
+EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
+  const Index k = static_cast<Index>(tets_.rows());
+  Vec energy(k), det(k);
+  constexpr Index kRun = 512;
+#pragma omp parallel for schedule(static)
+  for (Index run = 0; run < k; run += kRun)
+    for_batches(
+        x, w, run, std::min(k, run + kRun), element_values, [](Index t) { return t; },
+        [&](Index t, int lane, const ElementBatch& batch) {
+          det[t] = batch.det[lane];
+          energy[t] = batch.energy[lane];
+        });
+  EnergyReport report;
+  report.energy = blocked_sum(energy);
+  if (w.face > 0.0 && barrier_.size() > 0) {
+    Vec face(barrier_.size()), facing(barrier_.size());
+#pragma omp parallel for schedule(static)
+    for (Index f = 0; f < barrier_.size(); ++f) {
+      const FaceReport there = barrier_.value(x, f, w.epsilon);
+      face[f] = there.energy;
+      facing[f] = there.facing;
+    }
+    report.energy += w.face * blocked_sum(face);
+    report.min_facing = facing.minCoeff();
+    report.folds = static_cast<Index>((facing.array() <= 0.0).count());
+  }
+  report.min_det = k > 0 ? det.minCoeff() : 0.0;
+  report.flips = static_cast<Index>((det.array() <= 0.0).count());
+  return report;
+}
+
+// Adds the tet's share to the rows in [first, last).
+void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
+                              Points& gradient, double* blocks) const {
+  std::array<Index, 4> row;
+  for (int a = 0; a < 4; ++a) {
+    row[a] = vertex_row_[tets_(t, a)];
+    if (row[a] < first || row[a] >= last) row[a] = -1;
+  }
+  RowVector3d others = RowVector3d::Zero();
+  for (int a = 0; a < 3; ++a) {
+    const RowVector3d g(batch.gradient[3 * a][lane], batch.gradient[3 * a + 1][lane],
+                        batch.gradient[3 * a + 2][lane]);
+    others += g;
+    if (row[a + 1] >= 0) gradient.row(row[a + 1]) += g;
+  }
+  if (row[0] >= 0) gradient.row(row[0]) -= others;
+  if (!blocks) return;
+
+  // Rows and columns of the first vertex are minus the sums of the others'.
+  std::array<std::array<RowMatrix3d, 4>, 4> H;
+  int at = 0;
+  for (int a = 1; a < 4; ++a) {
+    for (int b = a; b < 4; ++b, ++at) {
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) H[a][b](i, j) = batch.block[at][3 * i + j][lane];
+      if (b > a) H[b][a] = H[a][b].transpose();
+    }
+  }
+  for (int a = 1; a < 4; ++a) {
+    H[a][0] = -(H[a][1] + H[a][2] + H[a][3]);
+    H[0][a] = H[a][0].transpose();
+  }
+  H[0][0] = -(H[0][1] + H[0][2] + H[0][3]);
+  for (int a = 0; a < 4; ++a) {
+    if (row[a] < 0) continue;
+    for (int b = 0; b < 4; ++b)
+      if (const Index slot = slot_(t, 4 * a + b); slot >= 0)
+        add_block(H[a][b], blocks + 9 * static_cast<std::ptrdiff_t>(slot));
+  }
+}
+
+void SolidEnergy::linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+                            linalg::BlockMatrix* hessian) const {
+  gradient.setZero(rows(), 3);
+  double* blocks = nullptr;
+  if (hessian) {
+    hessian->values.setZero();
+    blocks = hessian->values.data();
+  }
+  const Index parts = static_cast<Index>(part_tets_.size());
+#pragma omp parallel for schedule(static, 1)
+  for (Index p = 0; p < parts; ++p) {
+    const std::vector<Index>& list = part_tets_[p];
+    for_batches(
+        x, w, 0, static_cast<Index>(list.size()), blocks ? element_hessians : element_gradients,
+        [&](Index position) { return list[position]; },
+        [&](Index t, int lane, const ElementBatch& batch) {
+          add_element(batch, lane, t, part_row_[p], part_row_[p + 1], gradient, blocks);
+        });
+  }
+  if ((motion_.array() != kGliding).all()) return;
+  const Index n_rows = rows();
+#pragma omp parallel for schedule(static)
+  for (Index row = 0; row < n_rows; ++row) into_frames(x, row, gradient, blocks);
+  if (w.face <= 0.0) return;
+#pragma omp parallel for schedule(static, 1)
+  for (Index p = 0; p < parts; ++p) {
+    for (const Index f : part_faces_[p])
+      add_face(x, w, f, part_row_[p], part_row_[p + 1], gradient, blocks);
+  }
+}
+
+// Adds the boundary triangle's share to the rows in [first, last), which are in frames already.
+void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, Index first,
+                           Index last, Points& gradient, double* blocks) const {
+  Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
+  barrier_.linearise(x, f, w.epsilon, g, H);
+  for (int a = 0; a < 3; ++a) {
+    const Index row = vertex_row_[barrier_.faces()(f, a)];
+    if (row < first || row >= last) continue;
+    gradient.row(row).head<2>() += w.face * g.segment<2>(2 * a).transpose();
+    for (int b = 0; blocks && b < 3; ++b) {
+      Block(blocks + 9 * static_cast<std::ptrdiff_t>(face_slot_(f, 3 * a + b)))
+          .topLeftCorner<2, 2>() += w.face * H.block<2, 2>(2 * a, 2 * b);
+    }
+  }
+}
+
+// Axes of a vertex: Cartesian, or along the torus' coordinate circles and its normal.
+Matrix3d SolidEnergy::frame(const PointsRef& x, Index vertex) const {
+  if (motion_[vertex] != kGliding) return Matrix3d::Identity();
+  const double rho = x.row(vertex).head<2>().norm();
+  const double cu = x(vertex, 0) / rho, su = x(vertex, 1) / rho;
+  const double v = std::atan2(x(vertex, 2), rho - R_);
+  const double cv = std::cos(v), sv = std::sin(v);
+  Matrix3d Q;
+  Q.col(0) << -su, cu, 0.0;
+  Q.col(1) << -sv * cu, -sv * su, cv;
+  Q.col(2) << cv * cu, cv * su, sv;
+  return Q;
+}
+
+// Rewrites one block row in vertex frames and, for a gliding vertex, adds the torus' own second
+// derivatives (clamped to stay positive semi-definite) and removes the normal unknown.
+void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
+                              double* blocks) const {
+  const Index vertex = row_vertex_[row];
+  const Matrix3d Q = frame(x, vertex);
+  const bool gliding = motion_[vertex] == kGliding;
+  const Vector3d g = Q.transpose() * gradient.row(row).transpose();
+  for (Index p = row_ptr_[row]; blocks && p < row_ptr_[row + 1]; ++p) {
+    const Index other = row_vertex_[col_[p]];
+    if (!gliding && motion_[other] != kGliding) continue;
+    Block block(blocks + 9 * static_cast<std::ptrdiff_t>(p));
+    Matrix3d turned = Q.transpose() * block * frame(x, other);
+    if (gliding) turned.row(2).setZero();
+    if (motion_[other] == kGliding) turned.col(2).setZero();
+    if (gliding && other == vertex) {
+      const double rho = x.row(vertex).head<2>().norm();
+      const double cv = (rho - R_) / r_, sv = x(vertex, 2) / r_;
+      // Second derivatives of xi along arc length: uu is -radial / rho, vv is -normal / r,
+      // uv is -sin(v) e_u / rho, radial being cos(v) normal - sin(v) e_v.
+      Eigen::Matrix2d C;
+      C(0, 0) = -(cv * g[2] - sv * g[1]) / rho;
+      C(1, 1) = -g[2] / r_;
+      C(0, 1) = C(1, 0) = -sv * g[0] / rho;
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
+      eigen.computeDirect(C);
+      turned.topLeftCorner<2, 2>() += eigen.eigenvectors() *
+                                      eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                                      eigen.eigenvectors().transpose();
+      turned(2, 2) = 1.0;
+    }
+    block = turned;
+  }
+  gradient.row(row) = g.transpose();
+  if (gliding) gradient(row, 2) = 0.0;
+}
+
+Points SolidEnergy::move(const PointsRef& x, const PointsRef& step, double alpha) const {
+  Points moved = x;
+  const Index n_rows = rows();
+#pragma omp parallel for schedule(static)
+  for (Index row = 0; row < n_rows; ++row) {
+    const Index i = row_vertex_[row];
+    if (motion_[i] != kGliding) {
+      moved.row(i) += alpha * step.row(row);
+      continue;
+    }
+    const double rho = x.row(i).head<2>().norm();
+    const double u = std::atan2(x(i, 1), x(i, 0)) + alpha * step(row, 0) / rho;
+    const double v = std::atan2(x(i, 2), rho - R_) + alpha * step(row, 1) / r_;
+    const double radius = R_ + r_ * std::cos(v);
+    moved.row(i) << radius * std::cos(u), radius * std::sin(u), r_ * std::sin(v);
+  }
+  return moved;
+}
+
+double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) const {
+  const Index k = static_cast<Index>(tets_.rows());
+  Points direction = Points::Zero(x.rows(), 3);
+  for (Index row = 0; row < rows(); ++row)
+    direction.row(row_vertex_[row]) =
+        (frame(x, row_vertex_[row]) * step.row(row).transpose()).transpose();
+  double longest = 1.0 / 0.9;
+#pragma omp parallel for schedule(static) reduction(min : longest)
+  for (Index t = 0; t < k; ++t) {
+    Matrix3d E, D;
+    for (int a = 1; a < 4; ++a) {
+      E.col(a - 1) = x.row(tets_(t, a)) - x.row(tets_(t, 0));
+      D.col(a - 1) = direction.row(tets_(t, a)) - direction.row(tets_(t, 0));
+    }
+    const double d0 = E.determinant();
+    if (!(d0 > 0.0)) continue;
+    const auto det = [](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+      return a.dot(b.cross(c));
+    };
+    const double d1 = det(D.col(0), E.col(1), E.col(2)) + det(E.col(0), D.col(1), E.col(2)) +
+                      det(E.col(0), E.col(1), D.col(2));
+    const double d2 = det(D.col(0), D.col(1), E.col(2)) + det(D.col(0), E.col(1), D.col(2)) +
+                      det(E.col(0), D.col(1), D.col(2));
+    longest = std::min(longest, first_root(d0, d1, d2, D.determinant(), 1.0 / 0.9));
+  }
+  return std::min(1.0, 0.9 * longest);
+}
+
+Rows SolidEnergy::near_nullspace(const PointsRef& x) const {
+  Rows modes(3 * rows(), 3);
+  for (Index row = 0; row < rows(); ++row)
+    modes.middleRows<3>(3 * row) = frame(x, row_vertex_[row]).transpose();
+  return modes;
+}
+
+}  // namespace stretchmap::volume

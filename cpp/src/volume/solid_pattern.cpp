@@ -1,0 +1,161 @@
+// How SolidEnergy numbers its rows and elements, and the block pattern of its Hessian.
+#include <algorithm>
+#include <numeric>
+
+#include "stretchmap/linalg/pattern.hpp"
+#include "stretchmap/volume/solid_energy.hpp"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+namespace stretchmap::volume {
+namespace {
+
+using Eigen::RowVector3d;
+
+// Position along the Z-order curve with 10 bits an axis.
+std::uint32_t z_order(const RowVector3d& unit) {
+  std::uint32_t code = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto cell = static_cast<std::uint32_t>(std::clamp(unit[axis], 0.0, 0.999999) * 1024.0);
+    for (int bit = 0; bit < 10; ++bit) code |= ((cell >> bit) & 1u) << (3 * bit + axis);
+  }
+  return code;
+}
+
+int thread_count() {
+#ifdef _OPENMP
+  return omp_get_max_threads();
+#else
+  return 1;
+#endif
+}
+
+}  // namespace
+
+SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
+                         const FlagsRef& motion, double R, double r, const PointsRef& x,
+                         BoundaryBarrier barrier)
+    : motion_(motion), R_(R), r_(r), barrier_(std::move(barrier)) {
+  const Index n = static_cast<Index>(motion.size()), k = static_cast<Index>(tets.rows());
+  const RowVector3d low = x.colwise().minCoeff();
+  const double size = std::max((x.colwise().maxCoeff() - low).maxCoeff(), 1e-300);
+  std::vector<std::uint32_t> code(n);
+  std::vector<Index> active;
+  for (Index i = 0; i < n; ++i) {
+    if (motion[i] == kFixed) continue;
+    code[i] = z_order((x.row(i) - low) / size);
+    active.push_back(i);
+  }
+  std::stable_sort(active.begin(), active.end(),
+                   [&](Index a, Index b) { return code[a] < code[b]; });
+  row_vertex_ = Eigen::Map<const IndexVec>(active.data(), static_cast<Index>(active.size()));
+  vertex_row_.setConstant(n, -1);
+  for (Index row = 0; row < row_vertex_.size(); ++row) vertex_row_[row_vertex_[row]] = row;
+
+  // Tets by their lowest row, those without any at the end.
+  std::vector<Index> start(row_vertex_.size() + 2, 0), lowest(k);
+  for (Index t = 0; t < k; ++t) {
+    lowest[t] = static_cast<Index>(row_vertex_.size());
+    for (int a = 0; a < 4; ++a)
+      if (vertex_row_[tets(t, a)] >= 0) lowest[t] = std::min(lowest[t], vertex_row_[tets(t, a)]);
+    ++start[lowest[t] + 1];
+  }
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  order_.resize(k);
+  for (Index t = 0; t < k; ++t) order_[start[lowest[t]]++] = t;
+  tets_.resize(k, 4);
+  rest_.resize(k, 9);
+  weights_.resize(k);
+  for (Index t = 0; t < k; ++t) {
+    tets_.row(t) = tets.row(order_[t]);
+    rest_.row(t) = rest.row(order_[t]);
+    weights_[t] = weights[order_[t]];
+  }
+  build_pattern();
+}
+
+void SolidEnergy::build_pattern() {
+  const Index n_rows = rows(), k = static_cast<Index>(tets_.rows());
+  // 4 tet + corner for every corner of each row.
+  std::vector<Index> start(n_rows + 1, 0);
+  for (Index t = 0; t < k; ++t)
+    for (int a = 0; a < 4; ++a)
+      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) ++start[row + 1];
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<Index> corner(start[n_rows]), cursor(start.begin(), start.end() - 1);
+  for (Index t = 0; t < k; ++t)
+    for (int a = 0; a < 4; ++a)
+      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) corner[cursor[row]++] = 4 * t + a;
+  const auto for_corners = [&](Index row, const auto& visit) {
+    for (Index p = start[row]; p < start[row + 1]; ++p)
+      for (int b = 0; b < 4; ++b)
+        if (const Index other = vertex_row_[tets_(corner[p] / 4, b)]; other >= 0)
+          visit(corner[p], b, other);
+  };
+
+  const linalg::Pattern pattern =
+      linalg::build_pattern(n_rows, n_rows, [&](Index row, linalg::RowSet& set) {
+        set.add(row);
+        for_corners(row, [&](Index, int, Index other) { set.add(other); });
+      });
+  row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n_rows + 1);
+  col_ = Eigen::Map<const IndexVec>(pattern.col.data(), static_cast<Index>(pattern.col.size()));
+
+  slot_.setConstant(k, 16, -1);
+  for_chunks_with(
+      n_rows, [&] { return std::vector<Index>(n_rows); },
+      [&](Index begin, Index end, std::vector<Index>& place) {
+        for (Index row = begin; row < end; ++row) {
+          for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p) place[col_[p]] = p;
+          for_corners(row, [&](Index at, int b, Index other) {
+            slot_(at / 4, 4 * (at % 4) + b) = place[other];
+          });
+        }
+      });
+  const Index m = barrier_.size();
+  face_slot_.setConstant(m, 9, -1);
+  for (Index f = 0; f < m; ++f)
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        face_slot_(f, 3 * a + b) =
+            find_block(vertex_row_[barrier_.faces()(f, a)], vertex_row_[barrier_.faces()(f, b)]);
+
+  const Index parts = std::max<Index>(1, std::min<Index>(thread_count(), n_rows));
+  part_row_.resize(parts + 1);
+  for (Index p = 0; p <= parts; ++p)
+    part_row_[p] = static_cast<Index>(static_cast<std::int64_t>(n_rows) * p / parts);
+  const auto touching = [&](const auto& elements, int corners) {
+    std::vector<std::vector<Index>> lists(parts);
+    for (Index t = 0; t < elements.rows(); ++t) {
+      for (Index p = 0; p < parts; ++p) {
+        bool touches = false;
+        for (int a = 0; a < corners; ++a) {
+          const Index row = vertex_row_[elements(t, a)];
+          touches = touches || (row >= part_row_[p] && row < part_row_[p + 1]);
+        }
+        if (touches) lists[p].push_back(t);
+      }
+    }
+    return lists;
+  };
+  part_tets_ = touching(tets_, 4);
+  part_faces_ = touching(barrier_.faces(), 3);
+}
+
+Index SolidEnergy::find_block(Index row, Index column) const {
+  const Index* first = col_.data() + row_ptr_[row];
+  const Index* last = col_.data() + row_ptr_[row + 1];
+  return static_cast<Index>(std::lower_bound(first, last, column) - col_.data());
+}
+
+linalg::BlockMatrix SolidEnergy::pattern() const {
+  linalg::BlockMatrix matrix;
+  matrix.row_ptr = row_ptr_;
+  matrix.col = col_;
+  matrix.values.setZero(9 * col_.size());
+  return matrix;
+}
+
+}  // namespace stretchmap::volume
