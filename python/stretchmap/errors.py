@@ -27,6 +27,10 @@ class ArrayError(MeshError):
     """An array has the wrong shape, rank or type."""
 
 
+class KindError(ArrayError, TypeError):
+    """A mesh or a map of the wrong kind was given, or one that belongs to another mesh."""
+
+
 class IndexRangeError(MeshError):
     """An index points outside the vertex array."""
 

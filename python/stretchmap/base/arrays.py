@@ -173,8 +173,7 @@ def as_integers(
     """
     raw = _as_array(values, name)
     if raw.dtype.kind not in "iu":
-        hint = f"; convert with {name}.astype(int)" if raw.dtype.kind == "f" and raw.size else ""
-        raise ArrayError(f"{name} must hold integers, not {_kind(raw)}{hint}")
+        raise ArrayError(f"{name} must hold integers, not {_kind(raw)}")
     _check_axes(raw, name, shape)
     outside = (raw < low) | (raw > high)
     if outside.any():

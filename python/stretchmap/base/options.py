@@ -1,0 +1,172 @@
+"""Options at the edge: numbers, choices, flags and objects of a class, each refused by its name.
+
+Python takes ``True`` for 1, ``"3"`` for true and a NaN for a number that no bound refuses; what an
+option means is decided here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import os
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..errors import FileFormatError, OptionError
+
+__all__ = ["file_path", "flag", "instance", "memory", "one_of", "real", "whole"]
+
+_T = TypeVar("_T")
+
+
+def whole(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
+    """The option as an integer from ``low`` to ``high``.
+
+    Raises
+    ------
+    OptionError
+        It is none: 2.0, True and "2" are not.
+    """
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        number = operator.index(value)
+    except TypeError:
+        raise OptionError(f"{name} must be an integer, got {_shown(value)}") from None
+    if number < low:
+        raise OptionError(f"{name} must be at least {low}, got {_shown(number)}")
+    if number > high:
+        raise OptionError(f"{name} must be at most {high}, got {_shown(number)}")
+    return number
+
+
+def real(
+    name: str,
+    value: Any,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    above: float = -math.inf,
+    below: float = math.inf,
+) -> float:
+    """The option as a finite number with ``low <= value <= high`` and ``above < value < below``.
+
+    Raises
+    ------
+    OptionError
+        It is none.
+    """
+    number = math.nan
+    if not isinstance(value, (bool, np.bool_, str, bytes)) and np.ndim(value) == 0:
+        if not isinstance(value, (complex, np.complexfloating)):
+            try:
+                number = float(value)
+            except (TypeError, ValueError, OverflowError):
+                number = math.nan
+    if not math.isfinite(number):
+        raise OptionError(f"{name} must be a finite number, got {_shown(value)}")
+    if not (low <= number <= high and above < number < below):
+        bounds = [(low, "at least"), (high, "at most"), (above, "above"), (below, "below")]
+        words = [f"{word} {bound:g}" for bound, word in bounds if math.isfinite(bound)]
+        raise OptionError(f"{name} must be {' and '.join(words)}, got {number:g}")
+    return number
+
+
+def one_of(name: str, value: Any, choices: Sequence[str]) -> Any:
+    """The option, which is one of a few words.
+
+    Raises
+    ------
+    OptionError
+        It is another; names them all.
+    """
+    if not isinstance(value, str) or value not in choices:
+        words = " or ".join([", ".join(map(repr, choices[:-1])), repr(choices[-1])])
+        raise OptionError(f"{name} must be {words}, got {_shown(value)}")
+    return value
+
+
+def flag(name: str, value: Any) -> bool:
+    """The option as True or False.
+
+    Raises
+    ------
+    OptionError
+        It is neither, such as 1 or "no".
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise OptionError(f"{name} must be True or False, got {_shown(value)}")
+    return bool(value)
+
+
+def instance(name: str, value: Any, kind: type[_T], remedy: str) -> _T:
+    """The option as an object of a class.
+
+    Raises
+    ------
+    OptionError
+        It is of another; ``remedy`` says where one comes from.
+    """
+    if not isinstance(value, kind):
+        raise OptionError(f"{name} must be a {kind.__name__} ({remedy}), got {_shown(value)}")
+    return value
+
+
+def file_path(path: Any) -> str | os.PathLike[str]:
+    """A path as `open` takes it, but no file number and no bytes.
+
+    Raises
+    ------
+    FileFormatError
+        It is no path, or one that no file can have.
+    """
+    if not isinstance(path, (str, os.PathLike)) or isinstance(os.fspath(path), bytes):
+        raise FileFormatError(f"a file is named by a path, got {_shown(path)}")
+    if "\0" in os.fspath(path):
+        raise FileFormatError("no file name holds a null character")
+    return path
+
+
+def memory(what: str, wanted: float) -> None:
+    """Refuse what would not fit into the memory of this machine.
+
+    Parameters
+    ----------
+    what : str
+        What needs it, for the message.
+    wanted : float
+        Bytes, as far as they can be told beforehand.
+
+    Raises
+    ------
+    OptionError
+        More than there is.
+    """
+    there = installed_memory()
+    if wanted > there:
+        raise OptionError(
+            f"{what} would need about {wanted / 2**30:.3g} GiB of memory, this machine has "
+            f"{there / 2**30:.3g} GiB"
+        )
+
+
+def installed_memory() -> float:
+    """Bytes of memory, or what 32-bit ids can use of it where the system does not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return 2.0**40
+
+
+def _shown(value: Any) -> str:
+    """A value in a message, whatever its size and its ``__repr__`` do."""
+    if isinstance(value, int) and value.bit_length() > 256:
+        return f"an integer of {value.bit_length()} bits"
+    if isinstance(value, (str, int, float, complex, bool, type(None))):
+        text = repr(value)
+        return text if len(text) <= 60 else text[:57] + "..."
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
+    return f"an object of type {type(value).__name__}"

@@ -1,0 +1,55 @@
+"""Maps at the edge: the kind that is needed, or an error that says how to get it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..base.torus import Torus
+from ..errors import KindError, OptionError
+from ..mesh.meshes import TetMesh
+from .result import MapResult
+
+__all__ = ["as_map", "as_map_of_solid", "torus_of"]
+
+
+def as_map(result: Any, name: str = "result") -> MapResult:
+    """The argument as a map of a surface or a solid.
+
+    Raises
+    ------
+    KindError
+        It is no map.
+    """
+    if isinstance(result, MapResult):
+        return result
+    raise KindError(
+        f"{name}: a {type(result).__name__} was given where a map is needed, such as volume_map, "
+        "area_map, conformal_map and register return, or load_map reads"
+    )
+
+
+def as_map_of_solid(result: Any, task: str) -> tuple[MapResult, TetMesh]:
+    """The argument as a map of a solid, and the solid.
+
+    Raises
+    ------
+    KindError
+        It is no map, or the map of a surface.
+    """
+    mapped = as_map(result)
+    if isinstance(mapped.mesh, TetMesh):
+        return mapped, mapped.mesh
+    raise KindError(f"{task} needs the map of a solid, this is that of a surface; see volume_map")
+
+
+def torus_of(result: MapResult) -> Torus:
+    """The torus a map goes to.
+
+    Raises
+    ------
+    OptionError
+        It goes to another solid, or its file names no torus.
+    """
+    if result.torus is None:
+        raise OptionError("the map has no torus, so there are no coordinates on it")
+    return result.torus
