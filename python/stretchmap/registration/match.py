@@ -14,12 +14,13 @@ from .. import _core
 from ..base.progress import Progress, report
 from ..errors import LandmarkError, SolverError
 from ..maps.history import IterationRecord
-from .flat_torus import FlatSurface, damped_solve
+from .flat_torus import FlatSurface, damped_solve, wrapped
 
 _NO_SLOPES = np.zeros((0, 6))
 _SHORTEST = 1e-3  # steps shorter than this make no progress
 _RISE = 1.0  # energy that may be spent on one step towards the landmarks; 0 for an isometry
-_DRAG_STEPS = 60
+_FAR = 0.25  # a shorter step towards the landmarks calls for a relaxation before the next
+_STUCK = 12  # steps too short to get anywhere, with a relaxation after each
 _SHORT = 0.02  # a step shorter than this asks for another kind of step
 # Surfaces have edges, where the energy has kinks and a few faces block the step of all others:
 # after the two kinds of Newton step, vertices are moved one by one.
@@ -141,17 +142,16 @@ class SurfaceProblem:
         tangent: bool,
         wish: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Step of all vertices; held ones move by ``wish`` (or not at all)."""
+        """Newton step of all vertices but held ones; with ``wish`` (n, 2) these move by it instead,
+        and the others as the energy's second derivatives have them follow."""
         slopes = self.target.slopes(y) if tangent else _NO_SLOPES
         gradient, hessian = _core.registration.match_model(
             self.chart, y, points, slopes, self.rest, self.weights
         )
         free = np.flatnonzero(np.repeat(~self.held, 2))
-        step = np.zeros(2 * len(y))
-        if wish is not None:
-            step = wish.ravel().copy()
-        pull = (gradient + hessian @ step)[free]
-        step[free] = damped_solve(pull, hessian[free][:, free])
+        step = np.zeros(2 * len(y)) if wish is None else wish.ravel().copy()
+        pull = gradient if wish is None else hessian @ step
+        step[free] = damped_solve(pull[free], hessian[free][:, free])
         return step.reshape(-1, 2)
 
     def one_by_one(
@@ -270,6 +270,19 @@ def _search(
     return None
 
 
+def _relaxed(
+    problem: SurfaceProblem, y: NDArray[np.float64], points: NDArray[np.float64], energy: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """One step of every kind, the landmarks staying where they are."""
+    y, points = problem.one_by_one(y, points)
+    energy = problem.place(y)[1]
+    for tangent in (False, True):
+        taken = _search(problem, y, problem.newton_step(y, points, tangent), energy)
+        if taken is not None:
+            _, y, points, energy = taken
+    return y, points, energy
+
+
 def _draw(
     problem: SurfaceProblem,
     y: NDArray[np.float64],
@@ -280,9 +293,9 @@ def _draw(
     history: list[IterationRecord],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Move the landmarks to their goals, the rest following, as far at a time as nothing folds."""
-    for _ in range(_DRAG_STEPS):
-        left = goals - y[ids]
-        left -= np.round(left)
+    stuck = 0
+    while stuck < _STUCK:
+        left = wrapped(goals - y[ids])
         if np.abs(left).max() <= 1e-14:
             return y, points, energy
         wish = np.zeros_like(y)
@@ -295,16 +308,17 @@ def _draw(
                 moved[ids] = y[ids] + left
             points_there, value = problem.place(moved)
             if value < energy + _RISE:
+                y, points, energy = moved, points_there, value
                 break
             alpha *= 0.5
-        else:
-            break
-        y, points, energy = moved, points_there, value
         history.append(
             IterationRecord(
                 stage="match", iteration=len(history), energy=energy, step=alpha, flips=0
             )
         )
+        stuck = stuck + 1 if alpha < _SHORT else 0
+        if alpha < _FAR:
+            y, points, energy = _relaxed(problem, y, points, energy)
     far = int(np.argmax(np.abs(left).max(axis=1)))
     gap = y[ids] - y[ids[far]]
     distance = np.linalg.norm(gap - np.round(gap), axis=1)
