@@ -1,0 +1,55 @@
+"""The generator of random solids and the run over them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOM = Path(__file__).resolve().parents[3] / "bench" / "robustness"
+for package in ("manifold3d", "pyacvd", "pytetwild", "skimage", "tetgen"):
+    pytest.importorskip(package)
+
+
+@pytest.fixture(autouse=True)
+def room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOM))
+
+
+def test_there_are_the_families_asked_for(room):
+    from families import families
+
+    assert len(families()) >= 8
+    assert all(family.name == name for name, family in families().items())
+
+
+@pytest.mark.parametrize("name", ["raw_tubes", "thorny"])
+def test_a_seed_is_a_solid_torus_and_always_the_same(name):
+    from families import families
+
+    family = families()[name]
+    first, again, other = (family.draw(seed, 0.3) for seed in (2, 2, 3))
+    first.require_solid_torus()
+    assert np.array_equal(first.V, again.V) and np.array_equal(first.T, again.T)
+    assert first.V.shape != other.V.shape or not np.array_equal(first.V, other.V)
+
+
+def test_conformal_rings_have_even_triangles():
+    from families.rings import ring
+
+    surface = ring(np.random.default_rng(0), 1.02, 4_000, 0.0)
+    corners = surface.V[surface.F]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    assert surface.genus == 1
+    assert (edges.max(axis=1) / edges.min(axis=1)).max() < 3.0
+    # Yet their sizes differ by far: the hole is fifty times smaller than the ring.
+    assert surface.face_areas.max() > 1_000.0 * surface.face_areas.min()
+
+
+def test_more_parts_than_one_hole_are_refused():
+    from surfaces import Rejected, RoundCone, polygonize
+
+    ball = RoundCone(np.zeros(3), np.zeros(3), 1.0, 1.0)
+    with pytest.raises(Rejected):
+        polygonize([ball], 0.2)
