@@ -8,6 +8,7 @@ Writes meshes/spiky_0.npz and so on, `V` (n, 3) and `T` (k, 4).
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -22,13 +23,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("family", choices=known)
     parser.add_argument("seeds", type=int, nargs="+")
     parser.add_argument("--out", type=Path, default=Path())
+    parser.add_argument("--file", type=Path, help="of a single seed, instead of a folder")
     parser.add_argument("--size", type=float, default=1.0, help="factor of the number of tets")
     options = parser.parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)
     for seed in options.seeds:
         solid = known[options.family].draw(seed, options.size)
-        path = options.out / f"{options.family}_{seed}.npz"
-        np.savez(path, V=solid.V, T=solid.T)
+        path = options.file or options.out / f"{options.family}_{seed}.npz"
+        temporary = path.with_name(f".{os.getpid()}_{path.name}")
+        np.savez(temporary, V=solid.V, T=solid.T)
+        os.replace(temporary, path)
         print(f"{path}: {solid.n_tets} tets", flush=True)
     return 0
 
