@@ -49,7 +49,7 @@ def run(executable: Path, size: int, repeat: int) -> list[list[dict[str, Any]]]:
     return runs
 
 
-def summarise(runs: list[list[dict[str, Any]]]) -> dict[str, Any]:
+def summarize(runs: list[list[dict[str, Any]]]) -> dict[str, Any]:
     """Ratios and exact figures of several runs of the same stages.
 
     Returns
@@ -106,7 +106,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.executable is None or not options.executable.exists():
         print("no stretchmap_bench; build it first (bench/README.md)", file=sys.stderr)
         return 2
-    now = summarise(run(options.executable, options.size, options.repeat))
+    now = summarize(run(options.executable, options.size, options.repeat))
     if options.update:
         options.baseline.write_text(json.dumps(now, indent=1) + "\n")
         print(f"stored {options.baseline}")

@@ -36,7 +36,7 @@ for name, result in (("without landmarks", free), ("with 30 landmarks", guided))
         f"{name:20}  {e[skin].mean():12.2f}  {e[skin].max():5.2f}  {e[inner].mean():12.2f}"
         f"  {e[inner].max():5.2f}  {e[pair.source_landmarks].max():13.2g}"
     )
-moved = sm.distortion(pair.source, pair.truth).element_mad
+moved = sm.distortion(pair.source, pair.truth).element_error_mean
 print(
     f"(the true correspondence changes shares of volume by {100 * moved:.0f} % on average,"
     " a registration does not)"

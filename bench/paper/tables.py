@@ -61,7 +61,7 @@ def table_6_2(meshes: Meshes) -> Rows:
         paper = published.AREA.get(name, ("-",) * 4)
         yield (
             name, f"{d.total_distortion:.4f}", paper[0], f"{d.ring_mean:.4f}", paper[1],
-            f"{d.ring_sd:.4f}", paper[2], f"{d.element_sd:.4f}", f"{d.ratio_min:.3f}",
+            f"{d.ring_std:.4f}", paper[2], f"{d.element_std:.4f}", f"{d.ratio_min:.3f}",
             f"{d.ratio_max:.3f}", d.flips, paper[3], f"{d.angle_mean:.2f}", f"{seconds:.2f}",
         )  # fmt: skip
 
@@ -81,7 +81,7 @@ def table_6_3(meshes: Meshes) -> Rows:
             paper = published.VOLUME.get(name, {}).get(c, ("-",) * 5)
             yield (
                 name, c, f"{d.total_distortion:.4f}", paper[0], f"{d.ring_mean:.4f}", paper[1],
-                f"{d.ring_sd:.4f}", paper[2], d.flips, paper[3], "yes" if falls else "NO",
+                f"{d.ring_std:.4f}", paper[2], d.flips, paper[3], "yes" if falls else "NO",
                 f"{result.seconds['vsem']:.2f}", paper[4],
             )  # fmt: skip
 
@@ -97,7 +97,7 @@ def table_6_4(meshes: Meshes) -> Rows:
             paper = published.STEPS.get(name, {}).get(steps, ("-",) * 4)
             yield (
                 name, steps, f"{result.history[-1].energy:.4f}", f"{d.total_distortion:.4f}",
-                paper[0], f"{d.ring_sd:.4f}", paper[2], d.flips, paper[3],
+                paper[0], f"{d.ring_std:.4f}", paper[2], d.flips, paper[3],
             )  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def registrations(meshes: Meshes) -> Rows:
             yield (
                 source, target, len(result.landmarks), f"{result.landmark_error:.1e}",
                 "yes" if result.certificate.certified else "no", d.flips, f"{d.ring_mean:.4f}",
-                f"{d.ring_sd:.4f}", f"{d.total_distortion:.4f}", f"{d.ratio_min:.3f}",
+                f"{d.ring_std:.4f}", f"{d.total_distortion:.4f}", f"{d.ratio_min:.3f}",
                 f"{seconds:.1f}",
             )  # fmt: skip
             if marks is None:
@@ -212,8 +212,8 @@ def map_cells(result: sm.volume.VolumeMap) -> tuple[Any, ...]:
     """Flips, certificate, distortion and steps of a volume map."""
     d = result.distortion
     return (
-        d.flips, "yes" if result.certificate.certified else "no", f"{d.ring_sd:.4f}",
-        f"{d.total_distortion:.4f}", f"{d.element_mad:.4f}", f"{d.element_abs_sd:.4f}",
+        d.flips, "yes" if result.certificate.certified else "no", f"{d.ring_std:.4f}",
+        f"{d.total_distortion:.4f}", f"{d.element_error_mean:.4f}", f"{d.element_error_std:.4f}",
         f"{d.ratio_min:.3f}", f"{d.angle_mean:.2f}",
         sum(1 for record in result.history if record.iteration > 0),
     )  # fmt: skip

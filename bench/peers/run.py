@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 import scipy.io
-from scipy_vsem import face_vectors, minimise
+from scipy_vsem import face_vectors, minimize
 
 import stretchmap as sm
 from stretchmap import _core, samples
@@ -77,7 +77,7 @@ def compare(solid: TetMesh, c: float, steps: int, repeat: int) -> dict[str, dict
     start[solid.boundary_vertices] = boundary.image / scale
     fixed = np.zeros(len(V), bool)
     fixed[solid.boundary_vertices] = True
-    runs = {"stretchmap": ours, "SciPy": minimise}
+    runs = {"stretchmap": ours, "SciPy": minimize}
     if shutil.which("octave-cli"):
         runs["Octave"] = octave
     results: dict[str, dict[str, float]] = {}

@@ -57,7 +57,7 @@ class Assembly:
         return self._inner, self._couple
 
 
-def minimise(
+def minimize(
     V: Array, T: NDArray[np.int32], fixed: NDArray[np.bool_], start: Array, c: float, steps: int
 ) -> tuple[Array, float]:
     """Harmonic map and ``steps`` fixed-point steps; the image and the seconds of the steps."""

@@ -146,7 +146,7 @@ def remesh(surface: TriMesh, edge: float, sampling: float = 8.0) -> TriMesh:
 def fill(surface: TriMesh, edge: float | None = None) -> TetMesh:
     """Fill with tets by tetgen, the surface kept; with ``edge``, the inside as fine as that."""
     bound = None if edge is None else 1.5 * edge**3 / (6.0 * math.sqrt(2.0))
-    return samples.tetrahedralise(surface, max_volume=bound)
+    return samples.tetrahedralize(surface, max_volume=bound)
 
 
 def even_surface(surface: TriMesh, n_tets: float, sampling: float = 8.0) -> TriMesh:

@@ -188,18 +188,18 @@ def skin(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def solid_defects() -> list[Defect]:
     """What is wrong with a solid."""
     points, tets = solid()
-    centre = inner_vertex()
-    neighbour = int(next(i for i in tets[(tets == centre).any(1)][0] if i != centre))
+    center = inner_vertex()
+    neighbor = int(next(i for i in tets[(tets == center).any(1)][0] if i != center))
 
     def determinants(place: np.ndarray) -> np.ndarray:
         moved = points.copy()
-        moved[centre] = place
+        moved[center] = place
         x = moved[tets]
         return np.linalg.det(x[:, 1:] - x[:, :1])
 
-    outside = points[centre] + [1.7, 0.1, 0.2]
+    outside = points[center] + [1.7, 0.1, 0.2]
     folded = tuple(np.flatnonzero(determinants(outside) < 0).tolist())
-    flat = tuple(np.flatnonzero(abs(determinants(points[neighbour])) < 1e-12).tolist())
+    flat = tuple(np.flatnonzero(abs(determinants(points[neighbor])) < 1e-12).tolist())
 
     def defect(
         name: str, change: Any, error: type[Exception], ids: Any = None, depth: str = "closed"
@@ -212,10 +212,10 @@ def solid_defects() -> list[Defect]:
     return [
         defect("flipped", lambda V, T: (V, flip(T, [9, 40])), orientation, (9, 40)),
         defect("mirrored", lambda V, T: (-V, T), orientation, all_tets),
-        defect("inverted", lambda V, T: put(V, centre, outside), orientation, folded),
+        defect("inverted", lambda V, T: put(V, center, outside), orientation, folded),
         defect("duplicate", lambda V, T: (V, grown(T, T[3])), degenerate, (N_TETS,)),
         defect("repeated vertex", lambda V, T: (V, grown(T, [4, 4, 9, 2])), degenerate, (N_TETS,)),
-        defect("zero volume", lambda V, T: put(V, centre, V[neighbour]), degenerate, flat),
+        defect("zero volume", lambda V, T: put(V, center, V[neighbor]), degenerate, flat),
         defect("all in a plane", lambda V, T: (V * [1, 1, 0], T), degenerate, all_tets),
         defect("unreferenced", lambda V, T: (np.vstack([V, V[:1]]), T), degenerate, (new,)),
         defect(

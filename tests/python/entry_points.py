@@ -22,7 +22,7 @@ import numpy as np
 import stretchmap
 from defect_table import BASES, DEFECTS, Defect
 from stretchmap import TetMesh, TriMesh, errors
-from stretchmap.mesh.refinement import refine_boundary_joins
+from stretchmap.mesh.refinement import refine_overconstrained
 
 
 @dataclass(frozen=True)
@@ -148,10 +148,10 @@ ENTRIES = [
         lambda V, T: stretchmap.certify(TetMesh(V, T), TetMesh(V, T).V),
     ),
     Entry(
-        "refine_boundary_joins",
+        "refine_overconstrained",
         "solid",
         "arrays",
-        lambda V, T: refine_boundary_joins(TetMesh(V, T)),
+        lambda V, T: refine_overconstrained(TetMesh(V, T)),
     ),
     Entry(
         "homology_basis of a solid",

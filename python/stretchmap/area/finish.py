@@ -88,7 +88,7 @@ def _record(
         step=math.nan if taken is None else taken.step,
         residual=math.nan if taken is None else taken.decrement,
         flips=figures.flips,
-        ring_sd=figures.ring_sd,
-        element_sd=figures.face_sd,
+        ring_std=figures.ring_sd,
+        element_std=figures.face_sd,
         seconds=time.perf_counter() - start,
     )

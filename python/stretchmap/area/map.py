@@ -24,7 +24,7 @@ from ..maps.result import MapResult
 from ..measures.elements import Distortion, distortion
 from .finish import finish_areas
 from .search import search_phase
-from .sem import minimise_stretch, start_angles
+from .sem import minimize_stretch, start_angles
 
 if TYPE_CHECKING:
     from ..homology.basis import HomologyBasis
@@ -192,7 +192,7 @@ def area_map(
     clock = _lap(seconds, "conformal", clock)
 
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
-    turns, history = minimise_stretch(surface, chart, conformal, sem_iter, progress)
+    turns, history = minimize_stretch(surface, chart, conformal, sem_iter, progress)
     clock = _lap(seconds, "sem", clock)
 
     wanted = ratio if torus is None else torus.ratio

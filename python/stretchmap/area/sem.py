@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
 
-def minimise_stretch(
+def minimize_stretch(
     surface: TriMesh,
     chart: _core.area.SurfaceChart,
     conformal: ConformalMap,
@@ -49,8 +49,8 @@ def minimise_stretch(
                 step=math.nan if taken is None else taken.step,
                 residual=math.nan if taken is None else taken.residual,
                 flips=figures.flips,
-                ring_sd=figures.ring_sd,
-                element_sd=figures.face_sd,
+                ring_std=figures.ring_sd,
+                element_std=figures.face_sd,
                 seconds=time.perf_counter() - start,
             )
         )

@@ -198,14 +198,14 @@ def _boundary(
         proof = "the boundary image does not cross itself (exact tests)"
     else:
         proof = "the boundary image is a graph over the torus, covered once"
-    found.figures["winding"] = round(winding)
+    found.quantities["winding"] = round(winding)
     found.note(
         "covers_once",
         abs(winding - 1.0) < 1e-6,
         f"the boundary image covers the torus {winding:.6g} times instead of once",
     )
     distance = np.abs(s - torus.r) / torus.r
-    found.figures["torus_distance"] = float(distance.max())
+    found.quantities["torus_distance"] = float(distance.max())
     far = np.flatnonzero(distance > tolerance)
     found.note(
         "on_torus", not len(far), f"not on the torus: {describe('boundary vertex', far)}", far
@@ -226,9 +226,9 @@ def _volumes(
     # Either sum is off by less than its number of terms in units of rounding of the bounding box.
     box = float(np.prod(np.ptp(image, axis=0)))
     bound = 8.0 * np.finfo(float).eps * (len(T) + len(F)) * box
-    found.figures["image_volume"] = total
-    found.figures["enclosed_volume"] = enclosed
-    found.figures["smallest_volume"] = (
+    found.quantities["image_volume"] = total
+    found.quantities["enclosed_volume"] = enclosed
+    found.quantities["smallest_volume"] = (
         float(volumes.min() / (abs(total) / len(T))) if total else math.nan
     )
     found.note(

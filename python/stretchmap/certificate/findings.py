@@ -34,7 +34,7 @@ class Certificate:
         volume the boundary image encloses; ``on_torus``: boundary vertices lie on the torus.
         ``boundary_graph`` may fail without harm when ``boundary_embedded`` holds; then
         ``boundary_oriented``, the outward side of every face looking outward, is asked besides.
-    figures : dict of str to float
+    quantities : dict of str to float
         Numbers behind the checks: ``winding``, ``image_volume``, ``enclosed_volume``,
         ``torus_distance`` (largest distance of a boundary vertex, relative to r),
         ``smallest_volume`` (of an image tet, relative to the mean).
@@ -46,7 +46,7 @@ class Certificate:
     certified: bool
     reason: str
     checks: dict[str, bool]
-    figures: dict[str, float]
+    quantities: dict[str, float]
     ids: dict[str, tuple[int, ...]]
 
     def to_dict(self) -> dict[str, Any]:
@@ -54,9 +54,9 @@ class Certificate:
         return plain(self.__dict__)
 
     def summary(self) -> str:
-        """A table of the checks and figures."""
+        """A table of the checks and quantities."""
         rows: dict[str, Any] = {"certified": self.certified, "reason": self.reason}
-        return table({**rows, **self.checks, **self.figures})
+        return table({**rows, **self.checks, **self.quantities})
 
 
 class Findings:
@@ -64,7 +64,7 @@ class Findings:
 
     def __init__(self) -> None:
         self.checks: dict[str, bool] = {}
-        self.figures: dict[str, float] = {}
+        self.quantities: dict[str, float] = {}
         self.ids: dict[str, tuple[int, ...]] = {}
         self.reason = ""
 
@@ -80,6 +80,6 @@ class Findings:
             certified=not self.reason,
             reason=self.reason or proof,
             checks=self.checks,
-            figures=self.figures,
+            quantities=self.quantities,
             ids=self.ids,
         )

@@ -23,7 +23,7 @@ _log = logging.getLogger("stretchmap")
 
 
 class Spread(str, Enum):
-    """Values of ``--h``."""
+    """Values of ``--landmark-map``."""
 
     smooth = "smooth"
     affine = "affine"
@@ -52,8 +52,8 @@ def register_solids(
             show_default=False,
         ),
     ] = None,
-    h: Annotated[
-        Spread, typer.Option("--h", help="How landmarks are reached on the surface.")
+    landmark_map: Annotated[
+        Spread, typer.Option("--landmark-map", help="How landmarks are reached on the surface.")
     ] = Spread.smooth,
     keep_best: Annotated[
         bool,
@@ -78,7 +78,12 @@ def register_solids(
     watch.lap("read")
     with terminal(quiet) as bar:
         result = register_meshes(
-            source, goal, landmarks, h=h.value, keep_best=keep_best, progress=bar
+            source,
+            goal,
+            landmarks,
+            landmark_map=landmark_map.value,
+            keep_best=keep_best,
+            progress=bar,
         )
     watch.lap("compute")
     conclude(result, output, json, quiet, watch)

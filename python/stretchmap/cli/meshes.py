@@ -124,7 +124,7 @@ def tet(
     from .. import io
     from ..errors import MeshError
     from ..mesh.meshes import TetMesh
-    from ..samples import tetrahedralise
+    from ..samples import tetrahedralize
 
     common.check_output(output, io.suffixes(solid=True), input)
     common.require_package("tetgen", "filling a surface with tets", "mesh")
@@ -132,7 +132,7 @@ def tet(
     if isinstance(surface, TetMesh):
         raise MeshError(f"{input} is a solid already")
     surface.require_closed()
-    solid = tetrahedralise(surface, max_volume, quality)
+    solid = tetrahedralize(surface, max_volume, quality)
     io.write(output, solid)
     if not quiet:
         typer.echo(solid.diagnose().summary())

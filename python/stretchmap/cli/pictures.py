@@ -33,8 +33,8 @@ class By(str, Enum):
     v = "v"
 
 
-class Colour(str, Enum):
-    """Values of ``--colour``."""
+class Color(str, Enum):
+    """Values of ``--color``."""
 
     coordinate = "coordinate"
     ratio = "ratio"
@@ -63,8 +63,8 @@ def plot(
         By | None,
         typer.Option(help="For levels: shells (s, default), sectors round the axis or the tube."),
     ] = None,
-    colour: Annotated[
-        Colour | None,
+    color: Annotated[
+        Color | None,
         typer.Option(help="For cutaway: place in the source (default) or volume ratio."),
     ] = None,
     dpi: Annotated[float, typer.Option(help="Dots per inch.", min=20.0, max=1200.0)] = 150.0,
@@ -80,7 +80,7 @@ def plot(
 
     common.check_output(output, (".png", ".pdf", ".svg"), map_file)
     common.require_package("matplotlib", "drawing", "plot")
-    given = {"by": by, "colour": colour}
+    given = {"by": by, "color": color}
     options = {name: value.value for name, value in given.items() if value is not None}
     save(picture(load_map(map_file), kind.value, **options), output, dpi)
 

@@ -14,7 +14,7 @@ from .arrays import MeshArrays, triangles_only
 
 
 def read_off(data: bytes) -> MeshArrays:
-    """Parse an OFF file of triangles; normals and colours of the variants are skipped."""
+    """Parse an OFF file of triangles; normals and colors of the variants are skipped."""
     text = re.sub(rb"#.*", b"", data)
     header = re.match(rb"\s*((?:ST)?C?N?)OFF\b", text)
     if not header:

@@ -32,7 +32,7 @@ class IterationRecord:
         Gradient norm or whatever the stage stops on.
     flips : int
         Number of elements with the wrong sign.
-    ring_sd, element_sd : float
+    ring_std, element_std : float
         Standard deviation of the per-vertex ratios (6.3)/(6.5) and of the per-element ratios.
     seconds : float
         Since the start of the stage.
@@ -44,6 +44,6 @@ class IterationRecord:
     step: float = NAN
     residual: float = NAN
     flips: int = -1
-    ring_sd: float = NAN
-    element_sd: float = NAN
+    ring_std: float = NAN
+    element_std: float = NAN
     seconds: float = NAN

@@ -38,13 +38,13 @@ class Distortion:
         reference for its orientation (see :func:`distortion`).
     total_distortion : float
         D_area (6.2) or D_volume (6.4), both with the factor 1/4.
-    ring_mean, ring_sd, ring_min, ring_max : float
+    ring_mean, ring_std, ring_min, ring_max : float
         Of the per-vertex ratios (6.3) or (6.5); population standard deviation.
-    element_mad : float
+    element_error_mean : float
         Mean over the elements of ``|ratio - 1|``.
-    element_sd : float
+    element_std : float
         Standard deviation of the elements' ratios.
-    element_abs_sd : float
+    element_error_std : float
         Standard deviation of ``|ratio - 1|``, the figure some papers print beside the mean.
     ratio_min, ratio_max : float
         Of the elements' signed ratios.
@@ -73,12 +73,12 @@ class Distortion:
     flips: int | None
     total_distortion: float
     ring_mean: float
-    ring_sd: float
+    ring_std: float
     ring_min: float
     ring_max: float
-    element_mad: float
-    element_sd: float
-    element_abs_sd: float
+    element_error_mean: float
+    element_std: float
+    element_error_std: float
     ratio_min: float
     ratio_max: float
     angle_mean: float
@@ -182,12 +182,12 @@ def distortion(
         flips=len(flipped) if oriented else None,
         total_distortion=0.25 * float(np.abs(source_ring - image_ring).sum()),
         ring_mean=float(ring.mean()),
-        ring_sd=float(ring.std()),
+        ring_std=float(ring.std()),
         ring_min=float(ring.min()),
         ring_max=float(ring.max()),
-        element_mad=float(deviation.mean()),
-        element_sd=float(ratios.std()),
-        element_abs_sd=float(deviation.std()),
+        element_error_mean=float(deviation.mean()),
+        element_std=float(ratios.std()),
+        element_error_std=float(deviation.std()),
         ratio_min=float(ratios.min()),
         ratio_max=float(ratios.max()),
         angle_mean=float(measures.angle[good].mean()) if good.any() else math.inf,

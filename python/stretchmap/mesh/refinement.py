@@ -22,12 +22,12 @@ from ..errors import ArrayError
 from .meshes import TetMesh
 from .split_edges import TET_EDGES, split_edges
 
-__all__ = ["Refinement", "refine_boundary_joins"]
+__all__ = ["Refinement", "refine_overconstrained"]
 
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """A solid without boundary joins, and the way back to the one it came from.
+    """A solid without overconstrained elements, and the way back to the one it came from.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Refinement:
         )
 
 
-def refine_boundary_joins(solid: TetMesh) -> Refinement:
+def refine_overconstrained(solid: TetMesh) -> Refinement:
     """Split every interior edge and face whose vertices all lie on the boundary.
 
     Each such edge is halved at its midpoint, with all tets round it; each such face whose edges lie
@@ -132,8 +132,8 @@ def refine_boundary_joins(solid: TetMesh) -> Refinement:
     Returns
     -------
     Refinement
-        With `boundary_joins` of ``solid`` empty; ``solid`` is the input itself when there was
-        nothing to split.
+        With `overconstrained_elements` of ``solid`` empty; ``solid`` is the input itself when
+        there was nothing to split.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def crowded_edges(solid: TetMesh, tets: NDArray[np.intp]) -> NDArray[np.int32]:
     Parameters
     ----------
     solid : TetMesh
-        Without boundary joins.
+        Without overconstrained elements.
     tets : ndarray of intp
 
     Returns

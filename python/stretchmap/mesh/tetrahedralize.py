@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from ..errors import MissingDependencyError, OptionError, SolverError
 from .meshes import TetMesh, TriMesh
 
-__all__ = ["tetrahedralise"]
+__all__ = ["tetrahedralize"]
 
 
-def tetrahedralise(
+def tetrahedralize(
     surface: TriMesh, max_volume: float | None = None, quality: float = 1.4
 ) -> TetMesh:
     """Fill a closed surface with tets, the surface kept exactly as it is.

@@ -1,6 +1,6 @@
 """Pictures of maps. Every function returns a matplotlib Figure; none shows it.
 
-Colours are those of viridis, cividis and Okabe and Ito, told apart by colour-blind eyes and in grey
+Colors are those of viridis, cividis and Okabe and Ito, told apart by color-blind eyes and in grey
 print. All functions take any map: a result of `volume_map`, `area_map`, `conformal_map` or
 `register`, or one read by `load_map`. Statistics of a map, its boundary surface, the inside of a
 solid and pairs of solids have a module each; ``_painting`` draws surfaces without a graphics card.

@@ -115,12 +115,12 @@ class Morph:
         ids, faces = self.solid.boundary_vertices, self.solid.surface.F
         start = self.solid.V[ids]
         around = np.concatenate([start, self.image[ids]])
-        colours = along(start[faces].mean(axis=1), start)
+        colors = along(start[faces].mean(axis=1), start)
 
         def draw(i: int) -> list[Any]:
             axes.clear()
             scene = Scene(broad_view(start))
-            scene.add_faces(self.frame(i)[ids][faces], colours)
+            scene.add_faces(self.frame(i)[ids][faces], colors)
             scene.draw(axes, around)
             return [axes.set_title(f"t = {self.times[i]:.2f}", fontsize=10)]
 

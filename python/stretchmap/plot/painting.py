@@ -60,18 +60,18 @@ class Scene:
 
     view: View
     _polygons: list[Array] = field(default_factory=list)
-    _colours: list[Array] = field(default_factory=list)
+    _colors: list[Array] = field(default_factory=list)
     _outlines: list[tuple[Array, Any]] = field(default_factory=list)
 
-    def add_faces(self, corners: Array, colours: Array) -> None:
+    def add_faces(self, corners: Array, colors: Array) -> None:
         """Add triangles; those that look away from the viewer are left out.
 
         Parameters
         ----------
         corners : (m, 3, 3) ndarray
             Corners of each face, counter-clockwise from outside.
-        colours : (m, 3) ndarray
-            Colour of each face in full light, red, green, blue from 0 to 1.
+        colors : (m, 3) ndarray
+            Color of each face in full light, red, green, blue from 0 to 1.
         """
         x = corners @ self.view.axes.T
         normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
@@ -80,15 +80,15 @@ class Scene:
         seen = normals[:, 2] > 0.0
         bright = 0.55 + 0.45 * np.clip(normals[seen] @ _LIGHT, 0.0, 1.0)
         self._polygons.append(x[seen])
-        self._colours.append(np.clip(colours[seen] * bright[:, None], 0.0, 1.0))
+        self._colors.append(np.clip(colors[seen] * bright[:, None], 0.0, 1.0))
 
-    def add_loop(self, points: Array, colour: Any, width: float, lift: float) -> None:
+    def add_loop(self, points: Array, color: Any, width: float, lift: float) -> None:
         """Add a closed polygon: a ribbon, only dotted where faces lie before it.
 
         Parameters
         ----------
         points : (k, 3) ndarray
-        colour : colour of matplotlib
+        color : color of matplotlib
         width : float
             In the units of the points.
         lift : float
@@ -97,7 +97,7 @@ class Scene:
         from matplotlib.colors import to_rgb
 
         start = points @ self.view.axes.T
-        self._outlines.append((np.concatenate([start, start[:1]])[:, :2], colour))
+        self._outlines.append((np.concatenate([start, start[:1]])[:, :2], color))
         end = np.roll(start, -1, axis=0)
         along = end[:, :2] - start[:, :2]
         length = np.linalg.norm(along, axis=1, keepdims=True)
@@ -107,7 +107,7 @@ class Scene:
         depth = np.tile(0.5 * (start[:, 2] + end[:, 2]) + lift, (3, 1)).T[:, :, None]
         for triangle in ((a - side, b - side, b + side), (a - side, b + side, a + side)):
             self._polygons.append(np.concatenate([np.stack(triangle, axis=1), depth], axis=2))
-            self._colours.append(np.tile(to_rgb(colour), (len(points), 1)))
+            self._colors.append(np.tile(to_rgb(color), (len(points), 1)))
 
     def visible(self, points: Array, lift: float) -> NDArray[np.bool_]:
         """Whether no face lies before a point, brought nearer to the viewer by ``lift``.
@@ -139,20 +139,20 @@ class Scene:
         """Paint everything, the farthest first; fit the axes to it or to other points (n, 3)."""
         from matplotlib.collections import PolyCollection
 
-        polygons, colours = np.concatenate(self._polygons), np.concatenate(self._colours)
+        polygons, colors = np.concatenate(self._polygons), np.concatenate(self._colors)
         order = np.argsort(polygons[:, :, 2].mean(axis=1), kind="stable")
         polygons = polygons[:, :, :2]
         axes.add_collection(
             PolyCollection(
                 polygons[order],
-                facecolors=colours[order],
-                edgecolors=colours[order],
+                facecolors=colors[order],
+                edgecolors=colors[order],
                 linewidths=0.4,
                 rasterized=True,
             )
         )
-        for line, colour in self._outlines:
-            axes.plot(*line.T, ":", color=colour, linewidth=1.2)
+        for line, color in self._outlines:
+            axes.plot(*line.T, ":", color=color, linewidth=1.2)
         shown = polygons.reshape(-1, 2) if around is None else around @ self.view.axes[:2].T
         low, high = shown.min(axis=0), shown.max(axis=0)
         width, height = high - low

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_PALE = 0.5  # share of white in the colours of the surfaces, so that landmarks stand out
+_PALE = 0.5  # share of white in the colors of the surfaces, so that landmarks stand out
 _FREE = 24  # points carried to show a registration without landmarks
 _APART = 0.052  # least distance of two numbers, in widths of a panel
 
 
 def registration(result: MapResult) -> Figure:
-    """Source and target of a registration from two sides, landmarks numbered and coloured alike.
+    """Source and target of a registration from two sides, landmarks numbered and colored alike.
 
-    The colour is the position along the longest axis of the source, on the target that of the point
+    The color is the position along the longest axis of the source, on the target that of the point
     carried there. Dots are landmarks; rings are where the map carries those of the source, so that
     a ring without a dot in it is an error. Numbers are those of the rows of landmarks, from 0 on.
     Without landmarks points far from each other are carried.
@@ -62,9 +62,9 @@ def registration(result: MapResult) -> Figure:
     if len(pairs):
         Landmarks.of(solid, target, *pairs.T)  # refuses what a file may hold
     goals = target.V[pairs[:, 1]] if len(pairs) else image[marks]
-    colours = along(solid.V, solid.V)
+    colors = along(solid.V, solid.V)
     faces = ids[skin.F]
-    pale = _PALE + (1.0 - _PALE) * colours[faces].mean(axis=1)
+    pale = _PALE + (1.0 - _PALE) * colors[faces].mean(axis=1)
     front = broad_view(solid.V)
     turned = similarity(solid.V[ids], image[ids])[0]
     for row, view in zip(figure.subplots(2, 2), (front, front.opposite()), strict=True):
@@ -77,7 +77,7 @@ def registration(result: MapResult) -> Figure:
             scene.draw(axes)
             lift = 0.01 * float(np.ptp(points[:, 0]))
             seen = np.flatnonzero(scene.visible(dots, lift))
-            _mark(axes, dots @ stand.axes[:2].T, colours[marks], seen)
+            _mark(axes, dots @ stand.axes[:2].T, colors[marks], seen)
             if rings is not None:
                 at = rings[seen] @ stand.axes[:2].T
                 axes.scatter(*at.T, s=70, facecolors="none", edgecolors=BLACK, linewidths=0.9)
@@ -95,13 +95,13 @@ def registration(result: MapResult) -> Figure:
     return figure
 
 
-def _mark(axes: Axes, at: Array, colours: Array, seen: NDArray[np.intp]) -> None:
+def _mark(axes: Axes, at: Array, colors: Array, seen: NDArray[np.intp]) -> None:
     """Dots with their numbers beside them, out of each other's way."""
     from matplotlib.patheffects import withStroke
 
     if not len(seen):
         return
-    axes.scatter(*at[seen].T, s=26, c=colours[seen], edgecolors=BLACK, linewidths=0.8, zorder=3)
+    axes.scatter(*at[seen].T, s=26, c=colors[seen], edgecolors=BLACK, linewidths=0.8, zorder=3)
     width = float(np.diff(axes.get_xlim())[0])
     for i, place in zip(seen, _out_of_the_way(at[seen] / width) * width, strict=True):
         axes.plot(*np.stack([at[i], place]).T, color=BLACK, linewidth=0.5, zorder=2)

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 __all__ = ["cut", "loops", "save"]
 
-_COLOURS = {"coordinate": ("viridis", None), "ratio": ("cividis", (0.5, 1.5))}
+_COLORS = {"coordinate": ("viridis", None), "ratio": ("cividis", (0.5, 1.5))}
 
 
 def cut(
-    result: MapResult, colour: str = "coordinate", *, off_screen: bool = True
+    result: MapResult, color: str = "coordinate", *, off_screen: bool = True
 ) -> pyvista.Plotter:
     """The solid torus, cut open by a plane through its axis.
 
@@ -37,7 +37,7 @@ def cut(
     ----------
     result : MapResult
         A map of a solid.
-    colour : {"coordinate", "ratio"}
+    color : {"coordinate", "ratio"}
         By the position along the longest axis of the source, or by the volume ratio of each tet.
     off_screen : bool
         Draw without a window.
@@ -51,26 +51,26 @@ def cut(
     ArrayError
         The map is one of a surface.
     OptionError
-        Another colour.
+        Another color.
     MissingDependencyError
         PyVista is not installed.
     """
     if not isinstance(result.mesh, TetMesh):
         raise ArrayError("a cut needs the map of a solid, this is one of a surface")
-    if colour not in _COLOURS:
-        raise OptionError(f"colour must be one of {', '.join(_COLOURS)}, got {colour!r}")
+    if color not in _COLORS:
+        raise OptionError(f"color must be one of {', '.join(_COLORS)}, got {color!r}")
     pv = _pyvista()
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: result.mesh.T}, np.asarray(result.image))
     place = principal(result.mesh.V, result.mesh.V)[:, 0]
     grid.point_data["coordinate"] = place
     grid.cell_data["ratio"] = result.distortion.ratios
     half = grid.clip("y", origin=(0.0, 0.0, 0.0), invert=False)
-    table, limits = _COLOURS[colour]
+    table, limits = _COLORS[color]
     plotter = pv.Plotter(off_screen=off_screen)
     # The line break keeps the title off the numbers below it.
-    title = ("place in the source" if colour == "coordinate" else "volume ratio") + "\n"
+    title = ("place in the source" if color == "coordinate" else "volume ratio") + "\n"
     plotter.add_mesh(
-        half, scalars=colour, cmap=table, clim=limits or (place.min(), place.max()), ambient=0.3,
+        half, scalars=color, cmap=table, clim=limits or (place.min(), place.max()), ambient=0.3,
         scalar_bar_args={"title": title, "position_x": 0.2, "position_y": 0.01, "height": 0.11},
     )  # fmt: skip
     _look(plotter)

@@ -16,7 +16,7 @@ from ..errors import ArrayError, OptionError
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .painting import Array, Scene, View
-from .style import along, broad_view, cividis, colour_bar, empty_figure, frame, steps
+from .style import along, broad_view, cividis, color_bar, empty_figure, frame, steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +26,7 @@ _BINS = 36  # directions an opening may have
 _LOW, _RIGHT = 0.6, 0.5  # how far below and to the right of the viewer it is best seen
 
 
-def cutaway(result: MapResult, colour: str = "coordinate", opening: float = 0.35) -> Figure:
+def cutaway(result: MapResult, color: str = "coordinate", opening: float = 0.35) -> Figure:
     """Source and image side by side, laid open: tets are cut by planes of the image.
 
     From a solid torus a sector around the axis is taken out, and from the source what is mapped to
@@ -36,7 +36,7 @@ def cutaway(result: MapResult, colour: str = "coordinate", opening: float = 0.35
     ----------
     result : MapResult
         A map of a solid.
-    colour : {"coordinate", "ratio"}
+    color : {"coordinate", "ratio"}
         By the position along the longest axis of the source, or by the volume ratio of each tet.
     opening : float
         Share of the turn around the axis that is taken out, from 0 to below 1; a half cuts the
@@ -57,8 +57,8 @@ def cutaway(result: MapResult, colour: str = "coordinate", opening: float = 0.35
     """
     if not isinstance(result.mesh, TetMesh):
         raise ArrayError("a cut-away needs the map of a solid, this is one of a surface")
-    if colour not in ("coordinate", "ratio") or not 0.0 <= opening < 1.0:
-        raise OptionError("colour must be 'coordinate' or 'ratio' and 0 <= opening < 1")
+    if color not in ("coordinate", "ratio") or not 0.0 <= opening < 1.0:
+        raise OptionError("color must be 'coordinate' or 'ratio' and 0 <= opening < 1")
     figure = empty_figure(9.6, 4.2)
     pieces = _Pieces.of(result)
     view = broad_view(result.mesh.V)
@@ -72,13 +72,13 @@ def cutaway(result: MapResult, colour: str = "coordinate", opening: float = 0.35
         name, other = _TORUS, _torus_view(front)
         pieces, kept = pieces.opened(front, np.array([opening]))
     faces, tets = pieces.faces(kept)
-    if colour == "ratio":
-        colours = cividis(result.distortion.ratios[pieces.parent[tets]] - 0.5)
+    if color == "ratio":
+        colors = cividis(result.distortion.ratios[pieces.parent[tets]] - 0.5)
     else:
-        colours = along(pieces.source[faces].mean(axis=1), result.mesh.V)
+        colors = along(pieces.source[faces].mean(axis=1), result.mesh.V)
     ends = (("source", pieces.source, view), (name, pieces.image, other))
-    panels = _side_by_side(figure, ends, faces, colours)
-    colour_bar(figure, panels, result.mesh.V, ratio=colour == "ratio")
+    panels = _side_by_side(figure, ends, faces, colors)
+    color_bar(figure, panels, result.mesh.V, ratio=color == "ratio")
     return figure
 
 
@@ -88,7 +88,7 @@ def levels(
     by: str = "s",
     opening: float = 0.4,
 ) -> Figure:
-    """Parts between level surfaces in colours, in the source and in the solid torus (Figure 7.3).
+    """Parts between level surfaces in colors, in the source and in the solid torus (Figure 7.3).
 
     Nested shells are laid open in steps, so that each level surface shows between two cuts: the
     outermost shell lacks the largest sector around the axis, the innermost is whole.
@@ -229,13 +229,13 @@ def _side_by_side(
     figure: Figure,
     ends: tuple[tuple[str, Array, View], ...],
     faces: NDArray[np.int32],
-    colours: Array,
+    colors: Array,
 ) -> NDArray[np.object_]:
     """Panels with the same faces at different points, each with title, points and view."""
     panels = figure.subplots(1, len(ends))
     for axes, (title, points, view) in zip(panels, ends, strict=True):
         scene = Scene(view)
-        scene.add_faces(points[faces], colours)
+        scene.add_faces(points[faces], colors)
         scene.draw(axes)
         axes.set_title(title, fontsize=10)
     return np.asarray(panels)

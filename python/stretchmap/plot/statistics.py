@@ -10,7 +10,7 @@ from ..errors import OptionError
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .painting import Array
-from .style import BLACK, BLUE, GREY, ORANGE, empty_figure, steps
+from .style import BLACK, BLUE, GRAY, ORANGE, empty_figure, steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,15 +45,15 @@ def ratios(result: MapResult) -> Figure:
     low, high = np.quantile(np.concatenate([before, after]), [0.002, 0.998])
     low, high = min(low, 0.9), max(high, 1.1)
     bins = np.linspace(low, high, 121)
-    for values, label, colour in ((before, name, ORANGE), (after, "final map", BLUE)):
+    for values, label, color in ((before, name, ORANGE), (after, "final map", BLUE)):
         clipped = np.clip(values, low, high)
         share = np.full(len(values), 100.0 / len(values))
         axes.hist(
-            clipped, bins=bins, weights=share, histtype="stepfilled", color=colour, alpha=0.35,
+            clipped, bins=bins, weights=share, histtype="stepfilled", color=color, alpha=0.35,
             edgecolor="none",
         )  # fmt: skip
         axes.hist(
-            clipped, bins=bins, weights=share, histtype="step", color=colour, linewidth=1.6,
+            clipped, bins=bins, weights=share, histtype="step", color=color, linewidth=1.6,
             label=f"{label}: SD {values.std():.3g}, {int((values <= 0.0).sum())} flipped",
         )  # fmt: skip
     axes.axvline(1.0, color=BLACK, linewidth=0.8, linestyle=":")
@@ -95,21 +95,21 @@ def convergence(result: MapResult) -> Figure:
     position = np.arange(len(history))
     energy = np.array([record.energy for record in history])
     flips = np.array([record.flips for record in history], float)
-    for number, (stage, colour) in enumerate(zip(stages, steps(len(stages)), strict=True)):
+    for number, (stage, color) in enumerate(zip(stages, steps(len(stages)), strict=True)):
         at = np.array([record.stage == stage for record in history])
-        look = {"marker": _MARKERS[number % len(_MARKERS)], "ms": 4, "color": colour}
+        look = {"marker": _MARKERS[number % len(_MARKERS)], "ms": 4, "color": color}
         values = energy[at]
         scale = values[np.isfinite(values)][:1]
         if len(scale) and scale[0] > 0.0:
             top.plot(position[at], values / scale, label=stage, **look)
         counted = at & (flips >= 0)
         bottom.plot(position[counted], flips[counted], **look)
-    for name, label, style, colour in (
-        ("element_sd", "elements", "o-", BLACK), ("ring_sd", "vertex rings", "s--", GREY),
+    for name, label, style, color in (
+        ("element_std", "elements", "o-", BLACK), ("ring_std", "vertex rings", "s--", GRAY),
     ):  # fmt: skip
         values = np.array([getattr(record, name) for record in history])
         if np.isfinite(values).any():
-            middle.plot(position, values, style, ms=3, color=colour, label=label)
+            middle.plot(position, values, style, ms=3, color=color, label=label)
     top.set_yscale("log")
     top.set_ylabel("energy over that at\nthe start of the stage\n(dimensionless)")
     middle.set_yscale("log")
@@ -130,14 +130,14 @@ def ratios_before(result: MapResult) -> tuple[Array, str]:
     """Ratios of the map one would have without preserving anything, and its name."""
     from .. import _core
     from ..conformal.map import conformal_map
-    from ..volume.vsem import minimise_volumetric_stretch
+    from ..volume.vsem import minimize_volumetric_stretch
 
     mesh = result.mesh
     if not isinstance(mesh, TetMesh):
         return conformal_map(mesh).distortion.ratios, "conformal map"
     fixed = np.zeros(mesh.n_vertices, np.uint8)
     fixed[mesh.boundary_vertices] = 1
-    run = minimise_volumetric_stretch(
+    run = minimize_volumetric_stretch(
         mesh.V, mesh.T, fixed, np.array(result.image), c=0.0, max_iter=0, tol=0.0
     )
     volumes = _core.volume.signed_tet_volumes(run.image, mesh.T)

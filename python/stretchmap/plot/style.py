@@ -1,4 +1,4 @@
-"""What the pictures have in common: an empty figure, colours, views, the boundary of a map."""
+"""What the pictures have in common: an empty figure, colors, views, the boundary of a map."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BLACK, GREY = "#000000", "#8C8C8C"
+BLACK, GRAY = "#000000", "#8C8C8C"
 ORANGE, BLUE, VERMILION = "#E69F00", "#0072B2", "#D55E00"
 LIGHT_GREY = np.array([0.86, 0.86, 0.86])
 
@@ -86,12 +86,12 @@ def broad_view(points: Array) -> View:
 
 
 def viridis(values: Array) -> Array:
-    """(n, 3) colours of values from 0 to 1."""
+    """(n, 3) colors of values from 0 to 1."""
     return _from_table("viridis", values)
 
 
 def cividis(values: Array) -> Array:
-    """(n, 3) colours of values from 0 to 1."""
+    """(n, 3) colors of values from 0 to 1."""
     return _from_table("cividis", values)
 
 
@@ -102,14 +102,14 @@ def along(place: Array, reference: Array) -> Array:
 
 
 def steps(count: int) -> Array:
-    """Colours of a few things in a row, from dark to light."""
+    """Colors of a few things in a row, from dark to light."""
     return viridis(np.linspace(0.0, 0.95, count))
 
 
-def colour_bar(
+def color_bar(
     figure: Figure, axes: Axes | Sequence[Axes] | NDArray[Any], V: Array, ratio: bool = False
 ) -> None:
-    """Bar for the colours of `along` or, with ``ratio``, of cividis from 0.5 to 1.5."""
+    """Bar for the colors of `along` or, with ``ratio``, of cividis from 0.5 to 1.5."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

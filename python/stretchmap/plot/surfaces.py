@@ -17,7 +17,7 @@ from .style import (
     along,
     boundary,
     broad_view,
-    colour_bar,
+    color_bar,
     empty_figure,
     principal,
     torus_angles,
@@ -60,16 +60,16 @@ def domain(result: MapResult) -> Figure:
     place /= np.ptp(place[:, 0]) / 14.0
     corners = np.concatenate([place[surface.F], turns, surface.V[surface.F]], axis=2)
     points = _cut_at_cells(corners, np.arange(3))
-    centres = points.mean(axis=1)
-    colours = along(centres[:, 5:], surface.V)
-    odd = np.floor(centres[:, :3]).sum(axis=1) % 2 == 1
-    colours[odd] *= 0.72
+    centers = points.mean(axis=1)
+    colors = along(centers[:, 5:], surface.V)
+    odd = np.floor(centers[:, :3]).sum(axis=1) % 2 == 1
+    colors[odd] *= 0.72
     axes = figure.add_subplot()
     polygons = points[:, :, 3:5]
     low, high = polygons.min(axis=1), polygons.max(axis=1)
     shifts = np.array([(du, dv) for du in (-1, 0, 1) for dv in (-1, 0, 1)])
     copies = [
-        (polygons[inside] + shift, colours[inside])
+        (polygons[inside] + shift, colors[inside])
         for shift in shifts
         for inside in [((high + shift > 0.0) & (low + shift < 1.0)).all(axis=1)]
     ]
@@ -87,7 +87,7 @@ def domain(result: MapResult) -> Figure:
     axes.set_xlabel("u, around the axis (turns)")
     axes.set_ylabel("v, around the tube (turns)")
     axes.set_title("boundary in the chart of the torus, cells of the source", fontsize=10)
-    colour_bar(figure, axes, surface.V)
+    color_bar(figure, axes, surface.V)
     return figure
 
 
@@ -120,8 +120,8 @@ def checkerboard(result: MapResult, cells: tuple[int, int] = (24, 8)) -> Figure:
     points = _cut_at_cells(corners, np.arange(2))
     fields = points[:, :, :2].mean(axis=1)
     # There and back again, so that nothing jumps after a turn.
-    colours = viridis(np.abs(2.0 * (fields[:, 0] / cells[0] % 1.0) - 1.0) * 0.8)
-    colours[np.floor(fields).sum(axis=1) % 2 == 1] = 0.95
+    colors = viridis(np.abs(2.0 * (fields[:, 0] / cells[0] % 1.0) - 1.0) * 0.8)
+    colors[np.floor(fields).sum(axis=1) % 2 == 1] = 0.95
     panels = figure.subplots(1, 2)
     shown = (
         ("source, the checkerboard pulled back", points[:, :, 2:5], broad_view(surface.V)),
@@ -129,7 +129,7 @@ def checkerboard(result: MapResult, cells: tuple[int, int] = (24, 8)) -> Figure:
     )
     for axes, (title, faces, view) in zip(panels, shown, strict=True):
         scene = Scene(view)
-        scene.add_faces(faces, colours)
+        scene.add_faces(faces, colors)
         scene.draw(axes)
         axes.set_title(title, fontsize=10)
     return figure
@@ -170,12 +170,12 @@ def loops(result: MapResult | TriMesh | TetMesh) -> Figure:
     families = [("handle loop, bounds inside", VERMILION, basis.handle_loops)]
     if basis.tunnel_classes is not None:
         families.append(("tunnel loop, bounds outside", BLUE, basis.tunnel_loops))
-    for _, colour, found in families:
+    for _, color, found in families:
         for loop in found:
-            scene.add_loop(surface.V[loop], colour, 0.014 * size, 0.02 * size)
+            scene.add_loop(surface.V[loop], color, 0.014 * size, 0.02 * size)
     scene.draw(axes)
     axes.legend(
-        handles=[Line2D([], [], color=colour, lw=3, label=name) for name, colour, _ in families],
+        handles=[Line2D([], [], color=color, lw=3, label=name) for name, color, _ in families],
         loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=2, frameon=False,
     )  # fmt: skip
     return figure

@@ -28,11 +28,11 @@ from ..maps.history import IterationRecord
 from ..maps.result import MapResult
 from ..measures.elements import Distortion, distortion
 from ..mesh.meshes import TetMesh
-from ..mesh.refinement import Refinement, refine_boundary_joins
+from ..mesh.refinement import Refinement, refine_overconstrained
 from ..volume.flip_free import FlipFreeSolver
 from ..volume.options import FlipFreeOptions
 from ..volume.untangle import untangle_refining
-from ..volume.vsem import minimise_volumetric_stretch
+from ..volume.vsem import minimize_volumetric_stretch
 from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
@@ -64,7 +64,7 @@ class Registration(MapResult):
         the target's bounding box.
     gauge : Gauge
         How the flat tori were laid on each other.
-    h : str
+    landmark_map : str
         ``"smooth"`` or ``"affine"``.
     refinement : Refinement or None
         Of the source with its boundary edges split.
@@ -89,7 +89,7 @@ class Registration(MapResult):
     landmarks: Landmarks
     landmark_error: float
     gauge: Gauge
-    h: str
+    landmark_map: str
     refinement: Refinement | None = field(repr=False)
     boundary_splits: int
     history: tuple[IterationRecord, ...] = field(repr=False)
@@ -101,11 +101,11 @@ class Registration(MapResult):
     torus: None = None
 
     def extra_scalars(self) -> dict[str, Any]:
-        """Landmarks, gauge, kind of h and what was added to the input mesh."""
+        """Landmarks, gauge, landmark map and what was added to the input mesh."""
         added = self.refinement
         snapped = self.landmarks.snapped
         return {
-            "h": self.h,
+            "landmark_map": self.landmark_map,
             "landmarks": len(self.landmarks),
             "landmark_error": self.landmark_error,
             "snapped": float(snapped.max()) if snapped.size else 0.0,
@@ -126,7 +126,7 @@ def register(
     target: TetMesh,
     landmarks: Landmarks | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
     *,
-    h: str = "smooth",
+    landmark_map: str = "smooth",
     max_iter: int = 300,
     tol: float = 1e-3,
     keep_best: bool = False,
@@ -143,14 +143,15 @@ def register(
     landmarks : Landmarks, (source, target), path or None
         Pairs that correspond: vertex ids (k,) or points (k, 3) on either side, or a CSV file (see
         `read_landmarks`). Points are moved to the nearest boundary vertex; the result says how far.
-    h : {"smooth", "affine"}
+    landmark_map : {"smooth", "affine"}
         How landmarks are reached after the surfaces were matched for least distortion of area and
         shape. ``"smooth"``: by the same matching with the landmarks held, kept free of folds by a
         barrier. ``"affine"``: by the paper's piecewise-affine map on a Delaunay triangulation of
         the landmarks, here a periodic one.
     max_iter : int
         Most steps of the surface matching, twice if landmarks are held in it. With 0 and
-        ``h="affine"`` the boundary map is the paper's, but for the choice of the flat tori.
+        ``landmark_map="affine"`` the boundary map is the paper's, but for the choice of the flat
+        tori.
     tol : float
         Stop the surface matching when a step lowers its energy by no more than this share.
     keep_best : bool
@@ -186,8 +187,8 @@ def register(
     one that fits them best is taken; else the one in which the two surfaces differ least from
     similar shapes (rotation, translation, scale). Reflections are never used.
     """
-    if h not in ("smooth", "affine"):
-        raise OptionError(f"h must be 'smooth' or 'affine', got {h!r}")
+    if landmark_map not in ("smooth", "affine"):
+        raise OptionError(f"landmark_map must be 'smooth' or 'affine', got {landmark_map!r}")
     if max_iter < 0 or not tol >= 0.0:
         raise OptionError(f"max_iter and tol must not be negative, got {max_iter} and {tol}")
     for mesh in (source, target):
@@ -195,7 +196,9 @@ def register(
     marks = _landmarks(landmarks, source, target)
     seconds: dict[str, float] = {}
     clock = time.perf_counter()
-    boundary, gauge, history = _boundary_map(source, target, marks, h, max_iter, tol, progress)
+    boundary, gauge, history = _boundary_map(
+        source, target, marks, landmark_map, max_iter, tol, progress
+    )
     seconds["boundary"] = time.perf_counter() - clock
     if len(boundary.crossings) and not keep_best:
         raise CertificationError(
@@ -205,7 +208,7 @@ def register(
             boundary.crossings.ravel(),
         )
     return _fill(
-        boundary, source.n_vertices, target, marks, gauge, h, history,
+        boundary, source.n_vertices, target, marks, gauge, landmark_map, history,
         options or FlipFreeOptions(), solver, keep_best, seconds, progress,
     )  # fmt: skip
 
@@ -227,7 +230,7 @@ def _boundary_map(
     source: TetMesh,
     target: TetMesh,
     marks: Landmarks,
-    h: str,
+    landmark_map: str,
     max_iter: int,
     tol: float,
     progress: Progress | None,
@@ -239,12 +242,12 @@ def _boundary_map(
     )
     gauge = choose_gauge(first, second, pairs)
     first = first.changed(gauge)
-    held = pairs if h == "smooth" else pairs[:0]
+    held = pairs if landmark_map == "smooth" else pairs[:0]
     match = match_surfaces(
         first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
     )
     y, points = match.y, match.points
-    if h == "affine":
+    if landmark_map == "affine":
         starts, ends = y[pairs[:, 0]], second.turns[pairs[:, 1]]
         source, y, folded = unfold_boundary(
             source, y, lambda at: affine_landmark_map(starts, ends, at)
@@ -252,7 +255,7 @@ def _boundary_map(
         if len(folded):
             raise SolverError(
                 f"the source mesh is too coarse for the affine map: {len(folded)} faces turn over, "
-                "and refining them does not help; use h='smooth'",
+                "and refining them does not help; use landmark_map='smooth'",
                 folded,
             )
         points = second.points(y)
@@ -266,7 +269,7 @@ def _fill(
     target: TetMesh,
     marks: Landmarks,
     gauge: Gauge,
-    h: str,
+    landmark_map: str,
     history: tuple[IterationRecord, ...],
     options: FlipFreeOptions,
     solver: str,
@@ -278,18 +281,18 @@ def _fill(
     clock = time.perf_counter()
     source, points = boundary.solid, boundary.points
     n_split = source.n_vertices - n_given
-    refinement = refine_boundary_joins(source)
+    refinement = refine_overconstrained(source)
     solid, ids = refinement.solid, source.boundary_vertices
     enclosed = float(_core.mesh.enclosed_volume(points, source.surface.F))
     if not enclosed > 0.0:
         raise SolverError("the boundary image is inside out")
-    length, centre = enclosed ** (1.0 / 3.0), points.mean(axis=0)
+    length, center = enclosed ** (1.0 / 3.0), points.mean(axis=0)
     V = np.ascontiguousarray((solid.V - solid.V.mean(axis=0)) / source.volume ** (1.0 / 3.0))
     x = np.zeros((solid.n_vertices, 3))
-    x[ids] = (points - centre) / length
+    x[ids] = (points - center) / length
     fixed = np.zeros(solid.n_vertices, np.uint8)
     fixed[ids] = 1
-    run = minimise_volumetric_stretch(
+    run = minimize_volumetric_stretch(
         V, solid.T, fixed, x, c=_WARM_C, max_iter=_WARM_STEPS, tol=0.0, solver=solver,
         progress=progress,
     )  # fmt: skip
@@ -303,11 +306,11 @@ def _fill(
     solid = refinement.solid
     converged, stop_reason = False, f"{flips} tets could not be untangled"
     if flips == 0:
-        x, converged, stop_reason = flip_free.minimise(
+        x, converged, stop_reason = flip_free.minimize(
             x, glide=False, start=1.0, goal=options.volume_weight
         )
     seconds["volume"] = time.perf_counter() - clock
-    image = x * length + centre
+    image = x * length + center
     image[ids] = points
     clock = time.perf_counter()
     certificate = certify(solid, image)
@@ -329,7 +332,7 @@ def _fill(
         landmarks=marks,
         landmark_error=float(np.linalg.norm(gap, axis=1).max(initial=0.0)) / size,
         gauge=gauge,
-        h=h,
+        landmark_map=landmark_map,
         refinement=refinement if refinement.n_split else None,
         boundary_splits=n_split,
         history=history + run.history + tuple(flip_free.history),

@@ -90,7 +90,7 @@ def affine_landmark_map(
         pair = _worst_pair(nodes, moves, corners[folded]) % len(source)
         raise LandmarkError(
             f"landmarks {pair[0]} and {pair[1]} contradict each other: the map between them turns "
-            "over; correct or drop one of them, or use h='smooth'",
+            "over; correct or drop one of them, or use landmark_map='smooth'",
             pair,
         )
     base = np.floor(y)

@@ -1,6 +1,6 @@
 """Meshes of our own: solid tori by a structured sweep, closed surfaces, pairs to be registered."""
 
-from ..mesh.tetrahedralize import tetrahedralise
+from ..mesh.tetrahedralize import tetrahedralize
 from .solids import ball, bumpy_torus, knot_tube, solid_double_torus, solid_torus
 from .surfaces import double_torus, sphere, torus_surface
 from .vertebra import VertebraPair, vertebra_like, vertebra_pair
@@ -14,7 +14,7 @@ __all__ = [
     "solid_double_torus",
     "solid_torus",
     "sphere",
-    "tetrahedralise",
+    "tetrahedralize",
     "torus_surface",
     "vertebra_like",
     "vertebra_pair",

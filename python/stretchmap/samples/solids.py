@@ -1,6 +1,6 @@
 """Meshes of our own: solid tori by a structured sweep, closed surfaces, pairs to be registered.
 
-All but :func:`tetrahedralise` need nothing beyond NumPy.
+All but :func:`tetrahedralize` need nothing beyond NumPy.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..base.torus import TWO_PI, Torus
 from ..errors import OptionError
 from ..mesh.meshes import TetMesh
-from ..mesh.tetrahedralize import tetrahedralise
+from ..mesh.tetrahedralize import tetrahedralize
 from .sweep import (
     Array,
     Embedding,
@@ -29,7 +29,7 @@ __all__ = [
     "knot_tube",
     "solid_double_torus",
     "solid_torus",
-    "tetrahedralise",
+    "tetrahedralize",
 ]
 
 
@@ -122,9 +122,9 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
         raise OptionError(f"radius must be positive and below {0.45 * room:.3g}, got {radius}")
 
     def embed(turns: Array, x: Array, y: Array) -> Array:
-        centres = curve(turns[:, 0])
-        e1, e2 = closed_frame(centres)
-        return centres[:, None] + radius * (x[..., None] * e1[:, None] + y[..., None] * e2[:, None])
+        centers = curve(turns[:, 0])
+        e1, e2 = closed_frame(centers)
+        return centers[:, None] + radius * (x[..., None] * e1[:, None] + y[..., None] * e2[:, None])
 
     return swept(n_tets, length / radius, embed)
 

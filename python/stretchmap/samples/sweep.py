@@ -98,23 +98,23 @@ def least_distance_of_strands(points: Array, length: float) -> float:
     return float(distance[apart > 2.0 * distance].min(initial=math.inf))
 
 
-def closed_frame(centres: Array) -> tuple[Array, Array]:
+def closed_frame(centers: Array) -> tuple[Array, Array]:
     """Normals (m, 3), (m, 3) along a closed polygon, turning as little as possible.
 
     Double reflection carries the frame from station to station (Wang et al. 2008); what is missing
     after one round is spread evenly.
     """
-    m = len(centres)
-    tangent = np.roll(centres, -1, axis=0) - np.roll(centres, 1, axis=0)
+    m = len(centers)
+    tangent = np.roll(centers, -1, axis=0) - np.roll(centers, 1, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    normal = np.empty_like(centres)
+    normal = np.empty_like(centers)
     start = np.eye(3)[np.argmin(np.abs(tangent[0]))]
     start = start - (start @ tangent[0]) * tangent[0]
     current = start / np.linalg.norm(start)
     for i in range(m):
         normal[i] = current
         k = (i + 1) % m
-        chord = centres[k] - centres[i]
+        chord = centers[k] - centers[i]
         chord /= np.linalg.norm(chord)
         current = current - 2.0 * (chord @ current) * chord
         carried = tangent[i] - 2.0 * (chord @ tangent[i]) * chord

@@ -105,9 +105,9 @@ def vertebra_pair(
     return VertebraPair(source, target, truth, *ids)
 
 
-def _bump(angle: Array, centre: float, width: float) -> Array:
+def _bump(angle: Array, center: float, width: float) -> Array:
     """Smooth bump of height 1 on the circle, angles in radians."""
-    return np.exp((np.cos(angle - centre) - 1.0) / width**2)
+    return np.exp((np.cos(angle - center) - 1.0) / width**2)
 
 
 def _vertebra(seed: int | None) -> Embedding:

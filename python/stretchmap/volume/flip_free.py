@@ -70,7 +70,7 @@ class FlipFreeSolver:
         self._shares = volumes / volumes.sum()
         self._rings = _core.measures.ring_sums(self.T, self._shares, len(self.V))
         self._rest = _core.volume.rest_matrices(self.V, self.T, self.options.max_aspect)
-        self._minimiser: _core.volume.SolidNewton | None = (
+        self._minimizer: _core.volume.SolidNewton | None = (
             None  # of the last minimise, with its Hessian
         )
 
@@ -111,15 +111,20 @@ class FlipFreeSolver:
             step=step,
             residual=residual,
             flips=int(np.count_nonzero(~(volumes > 0.0))),
-            ring_sd=float(
+            ring_std=float(
                 (_core.measures.ring_sums(self.T, shares, len(self.V)) / self._rings).std()
             ),
-            element_sd=float((shares / self._shares).std()),
+            element_std=float((shares / self._shares).std()),
             seconds=time.perf_counter() - clock,
         )
         self.history.append(record)
         report(
-            self.progress, stage, iteration, total, flips=record.flips, element_sd=record.element_sd
+            self.progress,
+            stage,
+            iteration,
+            total,
+            flips=record.flips,
+            element_std=record.element_std,
         )
 
     def untangle(
@@ -185,7 +190,7 @@ class FlipFreeSolver:
                 epsilon = _next_epsilon(epsilon, worst)
         return x, int(left)
 
-    def minimise(
+    def minimize(
         self, x: NDArray[np.float64], *, glide: bool, start: float, goal: float
     ) -> tuple[NDArray[np.float64], bool, str]:
         """Newton steps with lambda growing from ``start`` to ``goal``; no tet turns over.
@@ -199,7 +204,7 @@ class FlipFreeSolver:
         o = self.options
         stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
         face = o.face_weight if glide else 0.0
-        newton = self._minimiser = self._newton(x, _GLIDING if glide else _FIXED)
+        newton = self._minimizer = self._newton(x, _GLIDING if glide else _FIXED)
         clock = time.perf_counter()
         weight, kept = start, 0
         for iteration in range(1, total + 1):
@@ -223,7 +228,7 @@ class FlipFreeSolver:
                 kept = 0 if small or step.alpha < 0.5 else (kept + 1) % o.shared
         return x, False, "most iterations done"
 
-    def equalise(self, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.float64]:
+    def equalize(self, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.float64]:
         """Make the volumes between level surfaces of u, v and s those of the source.
 
         Newton steps at the largest lambda towards the targets of `Marginals`, then its shifts. Both
@@ -238,8 +243,8 @@ class FlipFreeSolver:
         marginals = Marginals(
             self.T, self._shares, self.boundary, Torus(self.R, self.r), held=not glide
         )
-        newton = self._minimiser or self._newton(x, _GLIDING if glide else _FIXED)
-        self._minimiser = None
+        newton = self._minimizer or self._newton(x, _GLIDING if glide else _FIXED)
+        self._minimizer = None
         weights = _core.volume.EnergyWeights(
             1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0
         )
@@ -259,7 +264,7 @@ class FlipFreeSolver:
             x = self._gently_moved(x, moved, volumes)
             measured = marginals.measure(x)
             self._record(
-                "equalise", iteration + 1, x, marginals.error(measured), alpha, change, clock, total
+                "equalize", iteration + 1, x, marginals.error(measured), alpha, change, clock, total
             )
         return x
 
@@ -281,7 +286,7 @@ class FlipFreeSolver:
 
         Minimum-norm Newton steps over the interior vertices, the boundary held. Given up, and ``x``
         returned as it was, if a tet would turn over or the SD of the tet ratios would rise by more
-        than ``exact_sd_factor``.
+        than ``exact_std_factor``.
 
         Returns
         -------
@@ -314,13 +319,13 @@ class FlipFreeSolver:
                 break
         else:
             return x, False, f"the ring volumes are still off by {worst:.1e}"
-        if record.element_sd > self.options.exact_sd_factor * before:
+        if record.element_std > self.options.exact_std_factor * before:
             return (
                 x,
                 False,
                 (
                     f"exact ring volumes would raise the SD of the tet ratios from {before:.3g} to "
-                    f"{record.element_sd:.3g}"
+                    f"{record.element_std:.3g}"
                 ),
             )
         return moved, True, ""

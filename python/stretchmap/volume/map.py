@@ -24,8 +24,8 @@ from ..errors import CertificationError, DegenerateError, OptionError
 from ..maps.history import IterationRecord
 from ..maps.result import MapResult
 from ..measures.elements import Distortion, distortion
-from ..mesh.boundary_joins import boundary_joins
-from ..mesh.refinement import Refinement, refine_boundary_joins
+from ..mesh.overconstrained import overconstrained_elements
+from ..mesh.refinement import Refinement, refine_overconstrained
 from .options import FlipFreeOptions
 from .problem import SolidProblem
 from .routes import SolidRun, certified_route, vsem_route
@@ -66,9 +66,9 @@ class VolumeMap(MapResult):
     refinement : Refinement or None
         How ``solid`` came from the input, if it was refined.
     history : tuple of IterationRecord
-        Stages ``"vsem"``, ``"untangle"``, ``"frozen"``, ``"glide"``, ``"equalise"``, ``"exact"``,
+        Stages ``"vsem"``, ``"untangle"``, ``"frozen"``, ``"glide"``, ``"equalize"``, ``"exact"``,
         in that order. ``energy`` is the stretch energy in the first, the distortion energy in the
-        next three, the largest error of a marginal volume in ``"equalise"`` and the largest error
+        next three, the largest error of a marginal volume in ``"equalize"`` and the largest error
         of a ring volume in ``"exact"``.
     distortion : Distortion
     certificate : Certificate
@@ -172,7 +172,7 @@ def volume_map(
         With ``start`` only.
     vertex_exact : bool
         Certified route only: in the end make the ring volume (6.5) of every interior vertex exact,
-        unless that turns a tet over or costs too much (`FlipFreeOptions.exact_sd_factor`); the
+        unless that turns a tet over or costs too much (`FlipFreeOptions.exact_std_factor`); the
         result says whether it was done.
     refine : bool
         Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
@@ -242,9 +242,9 @@ def volume_map(
     if certified:
         clock = time.perf_counter()
         if refine:
-            refinement = refine_boundary_joins(solid)
+            refinement = refine_overconstrained(solid)
         else:
-            _refuse_joins(solid)
+            _refuse_overconstrained(solid)
         seconds["refine"] = time.perf_counter() - clock
     problem = SolidProblem.build(solid, refinement, boundary_map, start, torus)
     if certified:
@@ -310,14 +310,14 @@ def _with_overrides(
     return options if tol is None else dataclasses.replace(options, glide_tol=tol, frozen_tol=tol)
 
 
-def _refuse_joins(solid: TetMesh) -> None:
-    joins = boundary_joins(solid)
-    if len(joins):
+def _refuse_overconstrained(solid: TetMesh) -> None:
+    found = overconstrained_elements(solid)
+    if len(found):
         raise DegenerateError(
-            f"{len(joins.edges)} interior edges and {len(joins.faces)} interior faces have all "
+            f"{len(found.edges)} interior edges and {len(found.faces)} interior faces have all "
             "their vertices on the boundary, so the boundary map alone decides about the tets at "
             "them; allow their refinement (refine=True)",
-            joins.tets,
+            found.tets,
         )
 
 

@@ -36,7 +36,7 @@ class FlipFreeOptions:
     glide_tol, frozen_tol : float
         At the largest lambda: stop when a step lowers the energy by no more than this share. With
         the boundary held the decrease is slower from the beginning.
-    exact_sd_factor : float
+    exact_std_factor : float
         `FlipFreeSolver.make_rings_exact` may raise the SD of the tet ratios by this factor.
     shared : int
         Most steps in a row that share one Hessian; 1 renews it at every step.
@@ -58,7 +58,7 @@ class FlipFreeOptions:
     floor: float = 1e-3
     glide_tol: float = 2e-3
     frozen_tol: float = 5e-4
-    exact_sd_factor: float = 1.25
+    exact_std_factor: float = 1.25
     shared: int = 5
     cg_tol: float = 0.1
     max_cg: int = 200

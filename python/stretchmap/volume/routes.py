@@ -20,7 +20,7 @@ from ..maps.history import IterationRecord
 from .flip_free import FlipFreeSolver
 from .options import FlipFreeOptions
 from .untangle import untangle_refining
-from .vsem import minimise_volumetric_stretch
+from .vsem import minimize_volumetric_stretch
 
 if TYPE_CHECKING:
     pass
@@ -68,7 +68,7 @@ def vsem_route(
 ) -> SolidRun:
     """Algorithm 5.1."""
     clock = time.perf_counter()
-    run = minimise_volumetric_stretch(
+    run = minimize_volumetric_stretch(
         problem.V, problem.solid.T, problem.fixed, problem.x, c=c, max_iter=max_iter, tol=tol,
         harmonic=not problem.warm, solver=solver, progress=progress,
     )  # fmt: skip
@@ -126,24 +126,24 @@ def certified_route(
         goal = options.frozen_weight if glide else options.volume_weight
         if not (problem.warm and glide):
             first = options.volume_weight if problem.warm else 1.0
-            x, converged, stop_reason = flip_free.minimise(x, glide=False, start=first, goal=goal)
+            x, converged, stop_reason = flip_free.minimize(x, glide=False, start=first, goal=goal)
             seconds["frozen"] = time.perf_counter() - clock
         if glide:
             clock = time.perf_counter()
             first = options.volume_weight if problem.warm else goal
-            x, converged, stop_reason = flip_free.minimise(
+            x, converged, stop_reason = flip_free.minimize(
                 x, glide=True, start=first, goal=options.volume_weight
             )
             seconds["glide"] = time.perf_counter() - clock
     exact = False
     if flips == 0:
         clock = time.perf_counter()
-        equalised = flip_free.equalise(x, glide=glide)
-        if certify(solid, equalised, problem.torus).certified:
-            x = equalised
+        equalized = flip_free.equalize(x, glide=glide)
+        if certify(solid, equalized, problem.torus).certified:
+            x = equalized
         else:
             _log.warning("volumes along u, v and s left as they were: the boundary would fold")
-        seconds["equalise"] = time.perf_counter() - clock
+        seconds["equalize"] = time.perf_counter() - clock
     if flips == 0 and vertex_exact:
         clock = time.perf_counter()
         x, exact, reason = flip_free.make_rings_exact(x)

@@ -13,7 +13,7 @@ from .. import _core
 from ..base.progress import Progress, report
 from ..maps.history import IterationRecord
 
-__all__ = ["VsemRun", "minimise_volumetric_stretch"]
+__all__ = ["VsemRun", "minimize_volumetric_stretch"]
 
 # Relative residuals asked of the linear solves. A step starts from the last one's solution, and
 # what it leaves open the next one makes good; the less the last step changed the energy, the more
@@ -48,7 +48,7 @@ class VsemRun:
     stop_reason: str
 
 
-def minimise_volumetric_stretch(
+def minimize_volumetric_stretch(
     V: NDArray[np.float64],
     T: NDArray[np.int32],
     fixed: NDArray[np.uint8],
@@ -108,8 +108,8 @@ def minimise_volumetric_stretch(
                 energy=energy,
                 residual=residual,
                 flips=int(np.count_nonzero(~(volumes > 0.0))),
-                ring_sd=float((_core.measures.ring_sums(T, image_shares, len(V)) / rings).std()),
-                element_sd=float((image_shares / shares).std()),
+                ring_std=float((_core.measures.ring_sums(T, image_shares, len(V)) / rings).std()),
+                element_std=float((image_shares / shares).std()),
                 seconds=time.perf_counter() - clock,
             )
         )

@@ -340,14 +340,14 @@ def _lift(mesh: TriMesh, chart: _core.area.SurfaceChart, turns: np.ndarray) -> n
     shift = np.stack([chart.shift_u, chart.shift_v], axis=2)
     lifted, seen, stack = turns.copy(), np.zeros(len(turns), bool), [0]
     seen[0] = True
-    neighbours: dict[int, list[tuple[int, np.ndarray]]] = {}
+    neighbors: dict[int, list[tuple[int, np.ndarray]]] = {}
     for face, offsets in zip(mesh.F, shift, strict=True):
         for k in range(3):
             a, b = k, (k + 1) % 3
-            neighbours.setdefault(face[a], []).append((face[b], offsets[b] - offsets[a]))
+            neighbors.setdefault(face[a], []).append((face[b], offsets[b] - offsets[a]))
     while stack:
         i = stack.pop()
-        for j, jump in neighbours[i]:
+        for j, jump in neighbors[i]:
             if not seen[j]:
                 lifted[j] += np.round(lifted[i] - (lifted[j] + jump))
                 seen[j] = True
@@ -365,8 +365,8 @@ def test_history_records_and_falls(bumpy: TriMesh) -> None:
         assert (np.diff(energies) <= 1e-12 * energies[:-1]).all()
         assert all(record.flips == 0 for record in records)
     assert result.distortion.flips == 0
-    assert result.history[-1].ring_sd == pytest.approx(result.distortion.ring_sd, abs=1e-9)
-    assert result.history[-1].element_sd == pytest.approx(result.distortion.element_sd, rel=1e-6)
+    assert result.history[-1].ring_std == pytest.approx(result.distortion.ring_std, abs=1e-9)
+    assert result.history[-1].element_std == pytest.approx(result.distortion.element_std, rel=1e-6)
 
 
 def test_image_is_on_the_torus_of_the_same_area(bumpy: TriMesh) -> None:
@@ -438,8 +438,8 @@ def test_real_surfaces(load_surface, name: str, ring: float, face: float, angle:
     result = area_map(load_surface(name))
     d = result.distortion
     assert d.flips == 0
-    assert d.ring_sd <= ring
-    assert d.element_sd <= face
+    assert d.ring_std <= ring
+    assert d.element_std <= face
     assert d.total_distortion <= 1e-3
     assert d.angle_mean <= angle
 
@@ -470,7 +470,7 @@ def test_saved_map_comes_back(bumpy: TriMesh, tmp_path) -> None:
     np.testing.assert_array_equal(back.image, result.image)
     np.testing.assert_array_equal(back.arrays["angles"], result.angles)
     assert back.meta["phase"] == result.phase
-    assert "ring sd" in result.summary()
+    assert "ring std" in result.summary()
 
 
 @pytest.mark.parametrize(

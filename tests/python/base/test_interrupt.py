@@ -9,7 +9,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import samples
-from stretchmap.mesh.refinement import refine_boundary_joins
+from stretchmap.mesh.refinement import refine_overconstrained
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no interval timers here"),
@@ -66,7 +66,7 @@ STAGES = {
     "diagnosis": lambda solid, mapped: sm.TetMesh(solid.V, solid.T).diagnose(),
     "boundary": lambda solid, mapped: sm.TetMesh(solid.V, solid.T).surface,
     "edges": lambda solid, mapped: sm.TetMesh(solid.V, solid.T).edges,
-    "refinement": lambda solid, mapped: refine_boundary_joins(solid),
+    "refinement": lambda solid, mapped: refine_overconstrained(solid),
     "homology": lambda solid, mapped: sm.homology_basis(solid.surface, solid),
     "loops": lambda solid, mapped: sm.homology_basis(solid.surface).tunnel_loops,
     "conformal": lambda solid, mapped: sm.conformal_map(solid.surface),

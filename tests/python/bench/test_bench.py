@@ -33,7 +33,7 @@ def rows(factor: float = 1.0, slow: float = 1.0, flips: int = 0) -> list[dict[st
 
 
 def test_a_ratio_is_what_it_says(regression: ModuleType) -> None:
-    summary = regression.summarise([rows(), rows(slow=3.0)])
+    summary = regression.summarize([rows(), rows(slow=3.0)])
     # Geometric mean of 2 and 8 ms; copying 1e6 bytes takes 1 ms.
     assert summary["overall"] == pytest.approx(4.0)
     assert summary["stages"]["volume.vsem/9/threads:1"] == pytest.approx(2.0)
@@ -41,24 +41,24 @@ def test_a_ratio_is_what_it_says(regression: ModuleType) -> None:
 
 
 def test_a_slower_machine_is_no_regression(regression: ModuleType) -> None:
-    base = regression.summarise([rows()])
-    assert regression.regressions(regression.summarise([rows(factor=5.0)]), base, 1.01) == []
+    base = regression.summarize([rows()])
+    assert regression.regressions(regression.summarize([rows(factor=5.0)]), base, 1.01) == []
 
 
 def test_a_slower_stage_and_a_wrong_result_are(regression: ModuleType) -> None:
-    base = regression.summarise([rows()])
-    found = regression.regressions(regression.summarise([rows(slow=4.0)]), base, 1.6)
+    base = regression.summarize([rows()])
+    found = regression.regressions(regression.summarize([rows(slow=4.0)]), base, 1.6)
     assert [line.split(":")[0] for line in found] == ["volume.vsem/9/threads"]
-    found = regression.regressions(regression.summarise([rows(flips=1)]), base, 1.6)
+    found = regression.regressions(regression.summarize([rows(flips=1)]), base, 1.6)
     assert found == ["volume.vsem/9/threads:1 flips: 1 instead of 0"]
 
 
 def test_everything_slower_is(regression: ModuleType) -> None:
-    base = regression.summarise([rows()])
+    base = regression.summarize([rows()])
     slower = copy.deepcopy(rows())
     for row in slower[1:]:
         row["real_time"] *= 3.0
-    found = regression.regressions(regression.summarise([slower]), base, 1.6)
+    found = regression.regressions(regression.summarize([slower]), base, 1.6)
     assert found == ["all stages: 3.00 times the baseline"]
 
 

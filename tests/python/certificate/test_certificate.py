@@ -112,7 +112,7 @@ def test_identity_and_rigid_motions(solid):
     certificate = certify(solid, solid.V, TORUS)
     assert certificate.certified, certificate.summary()
     assert certificate.checks["boundary_graph"]
-    assert certificate.figures["winding"] == 1
+    assert certificate.quantities["winding"] == 1
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     moved = certify(solid, solid.V @ turn.T + 5.0)
@@ -188,7 +188,7 @@ def test_double_cover_with_all_tets_positive_is_refused():
     on_torus = certify(fine, image, TORUS)
     assert on_torus.checks["image_positive"] and on_torus.checks["boundary_graph"]
     assert not on_torus.certified and not on_torus.checks["covers_once"]
-    assert on_torus.figures["winding"] == 2
+    assert on_torus.quantities["winding"] == 2
     anywhere = certify(fine, image)
     assert not anywhere.certified and not anywhere.checks["boundary_embedded"]
 

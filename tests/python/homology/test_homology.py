@@ -141,8 +141,8 @@ def torus_knot(n, p, q, tube=0.4, start=0.0):
 
 
 def test_linking_numbers_of_known_links():
-    def ring(a, b, centre):
-        return np.outer(np.cos(RING), a) + np.outer(np.sin(RING), b) + centre
+    def ring(a, b, center):
+        return np.outer(np.cos(RING), a) + np.outer(np.sin(RING), b) + center
 
     x, y, z = np.eye(3)
     flat = ring(x, y, 0)
@@ -194,9 +194,9 @@ def test_linking_matrix_of_framed_tubes(curve, twist):
     surface = TriMesh(points, faces)
     long, short = lines(nu, nv)
     matrix = _core.homology.linking_matrix(surface.topology, surface.V, [long, short])
-    centre = curve(2 * np.pi * np.arange(nu) / nu)
+    center = curve(2 * np.pi * np.arange(nu) / nu)
     framing = {"circle": 0, "trefoil": -3, "figure_eight": 0}[curve.__name__] - twist
-    assert tubes.projected_linking(points[long], centre) == framing
+    assert tubes.projected_linking(points[long], center) == framing
     assert np.array_equal(matrix, [[framing, -1], [0, 0]])
 
     basis = homology_basis(surface)
@@ -261,7 +261,7 @@ def test_rings_linked_like_a_chain():
     assert not mixed.any()
     pairing = basis.tunnel_classes @ basis.intersection @ basis.handle_classes.T
     assert np.array_equal(pairing, np.eye(2, dtype=int))
-    along = [_core.testing.linking_number(*centre_lines())]
+    along = [_core.testing.linking_number(*center_lines())]
     assert np.abs(along) == 1
 
 
@@ -276,7 +276,7 @@ def linked_chain():
     return filled
 
 
-def centre_lines():
+def center_lines():
     first = np.array([[0, 0, 3], [6, 0, 3], [6, 6, 3], [0, 6, 3]], float)
     second = np.array([[3, 3, 0], [9, 3, 0], [9, 3, 6], [3, 3, 6]], float)
     return first, second

@@ -187,7 +187,7 @@ def test_harmonic_extension_of_a_linear_function_is_linear(backend, solid):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("noise", [0.1, 0.6])
-def test_stretched_weights_agree_with_a_factorisation(backend, noise, solid):
+def test_stretched_weights_agree_with_a_factorization(backend, noise, solid):
     """Weights over five orders of magnitude, a third of them of the wrong sign."""
     points, tets, inner = solid
     matrix = restrict(squeezed(points, tets, noise), inner)
@@ -445,7 +445,7 @@ def test_modes_are_the_kernel_of_free_elasticity():
 @pytest.mark.parametrize("preconditioner", ["multigrid", "jacobi"])
 @pytest.mark.parametrize("rigid", [False, True])
 @pytest.mark.parametrize("poisson", [0.3, 0.45, 0.49])
-def test_newton_systems_agree_with_a_factorisation(preconditioner, rigid, poisson, deformed_solid):
+def test_newton_systems_agree_with_a_factorization(preconditioner, rigid, poisson, deformed_solid):
     blocks, image, missing = deformed_solid(poisson)
     rhs = np.random.default_rng(0).standard_normal((len(image), 3))
     modes = (

@@ -18,11 +18,12 @@ from stretchmap.maps.history import IterationRecord
 from stretchmap.maps.result import MapResult, atomic_path, table
 from stretchmap.measures.elements import Distortion
 
-REQUIRED = {
-    "n_vertices", "n_elements", "flips", "ring_mean", "ring_sd", "element_mad", "element_sd",
-    "ratio_min", "ratio_max", "total_distortion", "energy", "iterations", "converged",
-    "stop_reason", "seconds", "torus", "versions",
-}  # fmt: skip
+REQUIRED = set(
+    """
+    n_vertices n_elements flips ring_mean ring_std element_error_mean element_std ratio_min
+    ratio_max total_distortion energy iterations converged stop_reason seconds torus versions
+    """.split()
+)
 TORUS = Torus(3.0, 1.0)
 HISTORY = (
     IterationRecord("vsem", 0, energy=3.0, flips=2),
@@ -112,7 +113,7 @@ def test_json_is_strict_where_numbers_are_not_finite(solid_map):
 
 def test_summary(solid_map):
     text = solid_map.summary()
-    for fragment in ("volume map", "ring sd", "R = 3, r = 1", "step limit", "seconds, volume"):
+    for fragment in ("volume map", "ring std", "R = 3, r = 1", "step limit", "seconds, volume"):
         assert fragment in text
     assert len({line.index("  ") > 0 for line in text.splitlines()}) == 1
 
@@ -143,8 +144,17 @@ def test_map_of_somebody_else(tmp_path):
     np.savez(path, V=surface.V.astype("f4"), F=surface.F.astype(">i8"), image=surface.V)
     back = load_map(path)
     assert back.torus is None and back.history == () and not back.converged
-    assert back.distortion.ring_sd < 1e-6
+    assert back.distortion.ring_std < 1e-6
     assert "map" in back.summary()
+
+
+def test_a_file_of_version_0_1_is_read(tmp_path):
+    record = {"stage": "sem", "iteration": 1, "energy": 2.0, "step": 1.0, "residual": None}
+    record |= {"flips": 0, "ring_sd": 0.25, "element_sd": 0.5, "seconds": 1.0}
+    meta = json.dumps({"history": [record]})
+    np.savez(tmp_path / "old.npz", V=np.eye(3), F=[[0, 1, 2]], image=np.eye(3), meta=meta)
+    (read,) = load_map(tmp_path / "old.npz").history
+    assert read.ring_std == 0.25 and read.element_std == 0.5
 
 
 @pytest.mark.parametrize("suffix", [".vtu", ".vtk"])
@@ -249,7 +259,7 @@ def test_atomic_write_leaves_nothing_on_failure_and_keeps_the_old_file(tmp_path)
 
 
 def test_table():
-    assert table({"ring_sd": 0.5, "x": None, "converged": True}) == (
-        "ring sd    0.5\nx          -\nconverged  yes"
+    assert table({"ring_std": 0.5, "x": None, "converged": True}) == (
+        "ring std   0.5\nx          -\nconverged  yes"
     )
     assert table({}) == ""

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import shapes
 from stretchmap.errors import MeshError
-from stretchmap.mesh.boundary_joins import boundary_joins
 from stretchmap.mesh.meshes import TetMesh, TriMesh
-from stretchmap.mesh.refinement import refine_boundary_joins
+from stretchmap.mesh.overconstrained import overconstrained_elements
+from stretchmap.mesh.refinement import refine_overconstrained
 
 
 def soup(seed: int, width: int, base: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -138,7 +138,7 @@ def test_solid_soup(seed):
     assert found.euler.sum() == len(used) - len(edges) + len(faces) - len(rows)
     assert found.n_components == groups(rows, lambda a, b: bool(set(a) & set(b)))
     TetMesh(points, tets, orient=True).diagnose()
-    for action in (boundary_joins, refine_boundary_joins, TetMesh.require_solid_torus):
+    for action in (overconstrained_elements, refine_overconstrained, TetMesh.require_solid_torus):
         try:
             action(solid)
         except MeshError as error:

@@ -158,13 +158,13 @@ def test_boundary_maps_both_ways(filled):
     owners = solid.T[solid.boundary_tets]
     assert (faces[:, :, None] == owners[:, None, :]).any(axis=2).all()
     assert surface.volume == pytest.approx(solid.volume)
-    centres = solid.V[owners].mean(axis=1)
+    centers = solid.V[owners].mean(axis=1)
     x = solid.V[faces]
     normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    assert (np.einsum("ij,ij->i", x[:, 0] - centres, normals) > 0).all()
+    assert (np.einsum("ij,ij->i", x[:, 0] - centers, normals) > 0).all()
 
 
-def test_edges_and_neighbours_against_numpy(ring):
+def test_edges_and_neighbors_against_numpy(ring):
     pairs = np.concatenate([ring.T[:, [i, j]] for i in range(4) for j in range(i)])
     np.testing.assert_array_equal(ring.edges, np.unique(np.sort(pairs, axis=1), axis=0))
     surface = ring.surface
@@ -290,8 +290,8 @@ def test_an_open_surface_goes_with_the_majority(torus):
 def test_a_fold_is_not_turned_away():
     """A vertex pulled through the opposite faces: consistent, and negative all the same."""
     points, tets = shapes.cubes(shapes.box(4, 4, 4))
-    centre = int(np.flatnonzero((points == 2).all(axis=1))[0])
-    points[centre] = [3.4, 2.1, 2.2]
+    center = int(np.flatnonzero((points == 2).all(axis=1))[0])
+    points[center] = [3.4, 2.1, 2.2]
     x = points[tets]
     negative = np.flatnonzero(np.linalg.det(x[:, 1:] - x[:, :1]) < 0)
     assert len(negative) > 0

@@ -76,8 +76,8 @@ def test_halves_and_levels_through_vertices(standard, by, start):
 def test_sectors_of_the_standard_torus_are_where_they_should_be(standard):
     parts = partition(standard, 4, "u")
     assert np.allclose(parts.levels[0], np.arange(4) * np.pi / 2, atol=1e-6)
-    centres = parts.image[parts.solid.T].mean(axis=1)
-    u = np.arctan2(centres[:, 1], centres[:, 0]) % (2 * np.pi)
+    centers = parts.image[parts.solid.T].mean(axis=1)
+    u = np.arctan2(centers[:, 1], centers[:, 0]) % (2 * np.pi)
     assert np.array_equal(parts.labels, np.floor(u / (np.pi / 2)).astype(int))
 
 

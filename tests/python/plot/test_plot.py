@@ -99,7 +99,7 @@ def test_axes_are_labelled(volume, kind):
 def test_histograms_hold_every_element_and_name_both_maps(volume):
     figure = plot.ratios(volume)
     labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    sd = volume.distortion.element_sd
+    sd = volume.distortion.element_std
     assert labels[0].startswith("harmonic map") and labels[1].startswith(f"final map: SD {sd:.3g}")
     for patch in figure.axes[0].patches[1::2]:
         outline = patch.get_xy()
@@ -115,7 +115,7 @@ def test_ratios_before_are_those_of_the_harmonic_map(volume):
     assert name == "harmonic map"
     assert np.average(before, weights=volume.solid.tet_volumes) == pytest.approx(1.0)
     # With no step at all the map is what we gave, not the harmonic one, which preserves less.
-    assert frozen.element_sd < before.std()
+    assert frozen.element_std < before.std()
 
 
 def test_convergence_shows_every_record(volume):
@@ -215,12 +215,12 @@ def test_every_part_is_in_the_picture_of_the_levels(volume, by, shown):
     figure = plot.levels(volume, shown, by)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert len(labels) == shown and all(label.endswith("25 %") for label in labels)
-    colours = [patch.get_facecolor()[:3] for patch in figure.legends[0].get_patches()]
+    colors = [patch.get_facecolor()[:3] for patch in figure.legends[0].get_patches()]
     for axes in figure.axes:
         painted = axes.collections[0].get_facecolors()[:, :3]
-        for colour in np.array(colours):
-            # Light dims a colour and leaves its hue.
-            dimmed = painted @ colour / np.linalg.norm(painted, axis=1) / np.linalg.norm(colour)
+        for color in np.array(colors):
+            # Light dims a color and leaves its hue.
+            dimmed = painted @ color / np.linalg.norm(painted, axis=1) / np.linalg.norm(color)
             assert (dimmed > 1.0 - 1e-9).sum() > 10
 
 
@@ -276,7 +276,7 @@ def test_wrong_requests_are_refused(volume, area, tmp_path):
     with pytest.raises(ArrayError, match="solid"):
         plot.cutaway(area)
     with pytest.raises(OptionError):
-        plot.cutaway(volume, colour="red")
+        plot.cutaway(volume, color="red")
     with pytest.raises(OptionError, match="no option 'by'"):
         plot.picture(volume, "cutaway", by="s")
     with pytest.raises(OptionError, match="'s', 'u' or 'v'"):
@@ -310,9 +310,9 @@ def test_the_nearer_face_is_painted_last_and_backs_are_left_out():
     square = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
     near, far = square + np.array([0.0, 0.0, 1.0]), square
     view = View(elevation=90.0, azimuth=0.0)
-    colours = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+    colors = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
     scene = Scene(view)
-    scene.add_faces(np.stack([near, far, near[::-1] + np.array([0.0, 0.0, 5.0])]), colours)
+    scene.add_faces(np.stack([near, far, near[::-1] + np.array([0.0, 0.0, 5.0])]), colors)
     figure = empty_figure(1.0, 1.0)
     axes = figure.add_subplot()
     scene.draw(axes)

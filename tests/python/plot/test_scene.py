@@ -22,7 +22,9 @@ def area():
     return sm.area_map(samples.bumpy_torus(1500).surface, finish="none")
 
 
-_IMPORTS = "from stretchmap import samples\nfrom stretchmap.plot import scene"
+_IMPORTS = (
+    "import stretchmap as sm\nfrom stretchmap import samples\nfrom stretchmap.plot import scene"
+)
 
 
 def drawn(body, folder):

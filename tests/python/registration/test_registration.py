@@ -84,7 +84,7 @@ def test_the_synthetic_pair_against_the_truth(pair, registered):
     # a target edge is 0.032 long, and landmarks are 0.08 apart.
     assert error.mean() < 0.012 and error[skin].mean() < 0.007
     assert error.mean() < without.mean() and error[skin].mean() < 0.7 * without[skin].mean()
-    assert result.distortion.ring_sd < 0.12 and result.distortion.total_distortion < 0.07
+    assert result.distortion.ring_std < 0.12 and result.distortion.total_distortion < 0.07
 
 
 def test_the_boundary_goes_to_the_boundary(pair, registered):
@@ -141,7 +141,7 @@ def test_bad_landmarks_are_named(pair):
         Landmarks.of(source, target, boundary[:3], target.boundary_vertices[:2])
     with pytest.raises(ArrayError):
         Landmarks.of(source, target, np.zeros((3, 2)), boundary[:3])
-    for options in ({"h": "wild"}, {"max_iter": -1}, {"tol": -1.0}):
+    for options in ({"landmark_map": "wild"}, {"max_iter": -1}, {"tol": -1.0}):
         with pytest.raises(OptionError):
             register(source, target, **options)
 
@@ -176,10 +176,13 @@ def test_affine_map_takes_landmarks_to_landmarks_and_is_periodic():
 
 def test_affine_registration_of_the_pair(pair):
     result = register(
-        pair.source, pair.target, (pair.source_landmarks, pair.target_landmarks), h="affine",
+        pair.source,
+        pair.target,
+        (pair.source_landmarks, pair.target_landmarks),
+        landmark_map="affine",
         keep_best=True,
-    )  # fmt: skip
-    assert result.h == "affine" and result.landmark_error < 1e-12
+    )
+    assert result.landmark_map == "affine" and result.landmark_error < 1e-12
 
 
 def test_contradicting_landmarks_name_the_pair(pair):
@@ -190,7 +193,7 @@ def test_contradicting_landmarks_name_the_pair(pair):
     second = int(near[1][first, 1])
     a[[first, second]] = a[[second, first]]
     with pytest.raises(LandmarkError) as caught:
-        register(pair.source, pair.target, (a, b), h="affine")
+        register(pair.source, pair.target, (a, b), landmark_map="affine")
     assert set(caught.value.ids) == {first, second}
 
 

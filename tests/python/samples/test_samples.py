@@ -109,10 +109,10 @@ def test_solids_that_are_no_tori():
         assert solid.surface.volume == pytest.approx(solid.volume)
 
 
-def test_tetrahedralise_keeps_the_surface():
+def test_tetrahedralize_keeps_the_surface():
     pytest.importorskip("tetgen")
     surface = samples.torus_surface(30, 12)
-    solid = samples.tetrahedralise(surface, max_volume=0.02)
+    solid = samples.tetrahedralize(surface, max_volume=0.02)
     n = len(surface.V)
     np.testing.assert_array_equal(solid.V[:n], surface.V)
     np.testing.assert_array_equal(solid.boundary_vertices, np.arange(n))
@@ -120,23 +120,23 @@ def test_tetrahedralise_keeps_the_surface():
         tuple(np.roll(f, -np.argmin(f))) for f in surface.F
     }
     assert solid.tet_volumes.min() > 0
-    assert len(solid.T) > 2 * len(samples.tetrahedralise(surface).T)
+    assert len(solid.T) > 2 * len(samples.tetrahedralize(surface).T)
     assert solid.volume == pytest.approx(surface.volume, rel=1e-12)
 
 
-def test_tetrahedralise_refuses_a_surface_that_crosses_itself():
+def test_tetrahedralize_refuses_a_surface_that_crosses_itself():
     pytest.importorskip("tetgen")
     surface = samples.torus_surface(30, 12)
     V = surface.V.copy()
     V[0] = -V[0]
     with pytest.raises(SolverError):
-        samples.tetrahedralise(TriMesh(V, surface.F))
+        samples.tetrahedralize(TriMesh(V, surface.F))
 
 
-def test_tetrahedralise_names_the_package_that_is_missing(monkeypatch):
+def test_tetrahedralize_names_the_package_that_is_missing(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "tetgen", None)
     with pytest.raises(MissingDependencyError, match="pip install"):
-        samples.tetrahedralise(samples.torus_surface(10, 5))
+        samples.tetrahedralize(samples.torus_surface(10, 5))
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_tetrahedralise_names_the_package_that_is_missing(monkeypatch):
         lambda: samples.vertebra_pair(100),
         lambda: samples.ball(0),
         lambda: samples.solid_double_torus(0),
-        lambda: samples.tetrahedralise(samples.torus_surface(10, 5), quality=0.5),
+        lambda: samples.tetrahedralize(samples.torus_surface(10, 5), quality=0.5),
     ],
 )
 def test_bad_parameters(call):

@@ -9,7 +9,7 @@ import pytest
 
 from stretchmap import _core, samples
 from stretchmap.base.torus import Torus
-from stretchmap.mesh.refinement import crowded_edges, refine_boundary_joins
+from stretchmap.mesh.refinement import crowded_edges, refine_overconstrained
 from stretchmap.volume.flip_free import FlipFreeSolver
 from stretchmap.volume.options import FlipFreeOptions
 from stretchmap.volume.problem import SolidProblem
@@ -25,7 +25,7 @@ def bolt():
     """A solid torus of hexagonal section, each with one interior vertex; its boundary is mapped so
     that one section becomes a bolt, its neighbours less so."""
     source = samples.solid_torus(400)
-    refinement = refine_boundary_joins(source)
+    refinement = refine_overconstrained(source)
     ids = source.boundary_vertices
     x, y, z = source.surface.V.T
     u, p = np.arctan2(y, x), np.hypot(x, y) - 3.0

@@ -136,7 +136,7 @@ def test_the_histogram_counts_every_tet_at_four_points(solid):
         assert column.sum() == pytest.approx(amount.sum(), rel=1e-12)
 
 
-def test_equalising_takes_no_more_than_a_fifth_of_a_tet(solid):
+def test_equalizing_takes_no_more_than_a_fifth_of_a_tet(solid):
     ids = solid.boundary_vertices
     solver = FlipFreeSolver(
         V=solid.V, T=solid.T, boundary=ids, faces=ids[solid.surface.F], R=3.0, r=1.0,

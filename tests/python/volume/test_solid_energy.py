@@ -77,7 +77,7 @@ def test_barrier_is_infinite_at_inversion_and_its_closed_form_holds():
 
 
 @pytest.mark.parametrize("rank", [0, 1, 2])
-def test_rank_deficient_elements_are_finite_when_regularised(rank):
+def test_rank_deficient_elements_are_finite_when_regularized(rank):
     J = np.zeros((3, 3))
     J[:rank, :rank] = np.eye(rank)
     energy, P, H = _core.testing.element_energy(J, _core.volume.EnergyWeights(1.0, 1.0, 0.5))
@@ -124,7 +124,7 @@ def test_face_gradient_is_by_arc_length_along_the_coordinate_circles(epsilon, fo
     assert np.linalg.eigvalsh(hessian).min() > -1e-10 * np.abs(hessian).max()
 
 
-def test_folded_face_is_infinitely_bad_without_regularisation():
+def test_folded_face_is_infinitely_bad_without_regularization():
     R, r, angles, faces, rest = face_case(folded=True)
     assert _core.testing.face_energy(on_torus(angles, R, r), faces, rest, R, r, 0.0)[0] == np.inf
 

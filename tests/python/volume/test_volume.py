@@ -118,7 +118,7 @@ def test_inexact_steps_lead_to_the_map_of_exact_ones(c):
     V = solid.V / solid.volume ** (1 / 3)
     start = V + 0.2 * np.sin(3.0 * V[:, [1, 2, 0]])
     run = functools.partial(
-        vsem.minimise_volumetric_stretch, V, solid.T, fixed, start, c=c, max_iter=20, tol=0.0
+        vsem.minimize_volumetric_stretch, V, solid.T, fixed, start, c=c, max_iter=20, tol=0.0
     )
     ours, exact = run(solver="multigrid"), run(solver="direct")
     energies = [np.array([r.energy for r in result.history]) for result in (ours, exact)]
@@ -175,8 +175,8 @@ def test_vsem_step_solves_the_paper_system(bumpy, c):
     stretch = _core.volume.VolumetricStretch(T, fixed, rest, "direct")
     moved, solved = stretch.step(x, c, 1e-12)
     # (5.6) folded into the rest volumes.
-    regularised = rest + c * np.abs(_core.volume.signed_tet_volumes(x, T))
-    L = full_laplacian(V, T, regularised, geometry=x)
+    regularized = rest + c * np.abs(_core.volume.signed_tet_volumes(x, T))
+    L = full_laplacian(V, T, regularized, geometry=x)
     free, held = np.flatnonzero(fixed == 0), np.flatnonzero(fixed)
     expected = sp.linalg.spsolve(sp.csc_matrix(L[free][:, free]), -L[free][:, held] @ x[held])
     assert np.allclose(moved[free], expected, atol=1e-9)
@@ -229,7 +229,7 @@ def test_certified_route_leaves_no_flip(bumpy, boundary):
 def test_gliding_improves_on_frozen(bumpy):
     frozen = sm.volume_map(bumpy, boundary="frozen").distortion
     glide = sm.volume_map(bumpy, boundary="glide").distortion
-    assert glide.element_mad < frozen.element_mad
+    assert glide.element_error_mean < frozen.element_error_mean
     assert glide.total_distortion < frozen.total_distortion
 
 
@@ -246,8 +246,8 @@ def test_going_on_from_a_saved_map_lowers_the_distortion_further(bumpy, tmp_path
     loaded = load_map(tmp_path / "map.npz")
     again = sm.volume_map(loaded.solid, start=loaded.image, torus=loaded.torus)
     assert again.certificate.certified
-    assert again.distortion.element_mad < first.distortion.element_mad
-    assert {record.stage for record in again.history} == {"glide", "equalise"}
+    assert again.distortion.element_error_mean < first.distortion.element_error_mean
+    assert {record.stage for record in again.history} == {"glide", "equalize"}
 
 
 def test_a_tangled_start_is_untangled(bumpy):
@@ -268,7 +268,7 @@ def test_ring_volumes_can_be_made_exact(bumpy):
     assert exact.vertex_exact and exact.certificate.certified
     inner = np.setdiff1d(np.arange(bumpy.n_vertices), bumpy.boundary_vertices)
     assert np.abs(exact.distortion.ring_ratios[inner] - 1.0).max() < 1e-9
-    assert exact.distortion.element_sd <= 1.25 * plain.distortion.element_sd
+    assert exact.distortion.element_std <= 1.25 * plain.distortion.element_std
     assert np.abs(plain.distortion.ring_ratios[inner] - 1.0).max() > 1e-6
 
 
@@ -293,7 +293,7 @@ def test_renumbering_rotating_and_scaling_the_input_changes_nothing(bumpy):
     moved = TetMesh(37.0 * bumpy.V[order] @ Q.T + 5.0, rank[bumpy.T])
     other = sm.volume_map(moved, c=0.0, max_iter=5).distortion
     # The boundary map stops at a tolerance; how far beyond it depends on rounding.
-    assert other.ring_sd == pytest.approx(reference.ring_sd, rel=1e-3)
+    assert other.ring_std == pytest.approx(reference.ring_std, rel=1e-3)
     assert other.total_distortion == pytest.approx(reference.total_distortion, rel=1e-3)
 
 

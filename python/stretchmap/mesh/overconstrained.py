@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from .. import _core
 from .meshes import TetMesh
 
-__all__ = ["BoundaryJoins", "boundary_joins"]
+__all__ = ["OverconstrainedElements", "overconstrained_elements"]
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryJoins:
+class OverconstrainedElements:
     """Interior edges and faces whose vertices all lie on the boundary.
 
     Attributes
@@ -36,7 +36,7 @@ class BoundaryJoins:
         return len(self.edges) + len(self.faces)
 
 
-def boundary_joins(solid: TetMesh) -> BoundaryJoins:
+def overconstrained_elements(solid: TetMesh) -> OverconstrainedElements:
     """Find the interior edges and faces whose vertices all lie on the boundary.
 
     Parameters
@@ -45,7 +45,7 @@ def boundary_joins(solid: TetMesh) -> BoundaryJoins:
 
     Returns
     -------
-    BoundaryJoins
+    OverconstrainedElements
         Empty (``len`` zero) exactly when no tet has more than one face, or all vertices, on the
         boundary, no interior edge joins two boundary vertices and no interior face three; a tet
         that is a component of its own apart.
@@ -58,4 +58,4 @@ def boundary_joins(solid: TetMesh) -> BoundaryJoins:
         Tets that repeat a vertex; ``ids`` are the tets.
     """
     found = _core.mesh.BoundaryJoins(solid.T, solid.n_vertices)
-    return BoundaryJoins(found.edges, found.faces, found.tets)
+    return OverconstrainedElements(found.edges, found.faces, found.tets)

@@ -1,4 +1,4 @@
-"""Splitting of boundary joins: nothing harmful is left, nothing else has changed."""
+"""Splitting of overconstrained elements: nothing harmful is left, nothing else has changed."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import pytest
 
 import shapes
 from stretchmap.errors import ArrayError, NonManifoldError
-from stretchmap.mesh.boundary_joins import boundary_joins
 from stretchmap.mesh.meshes import TetMesh
-from stretchmap.mesh.refinement import refine_boundary_joins
+from stretchmap.mesh.overconstrained import overconstrained_elements
+from stretchmap.mesh.refinement import refine_overconstrained
 
 JIGSAW = ["bob_jigsaw_small", "kitten_jigsaw_small", "rocker_arm_jigsaw", "petal_ring_synth_jigsaw"]
 
@@ -32,7 +32,7 @@ def capped(solid: TetMesh, faces: list[int]) -> TetMesh:
     return TetMesh(np.vstack([solid.V, tips]), np.vstack([solid.T, tets]))
 
 
-def naive_joins(solid: TetMesh) -> tuple[set, set, set]:
+def naive_overconstrained(solid: TetMesh) -> tuple[set, set, set]:
     """The definition read aloud: interior edges, faces and tets with boundary vertices only."""
     faces: dict[tuple, int] = {}
     for tet in solid.T.tolist():
@@ -54,7 +54,7 @@ def naive_joins(solid: TetMesh) -> tuple[set, set, set]:
 
 
 def check(solid: TetMesh) -> None:
-    done = refine_boundary_joins(solid)
+    done = refine_overconstrained(solid)
     new = done.solid
     n = solid.n_vertices
     np.testing.assert_array_equal(new.V[:n], solid.V)
@@ -68,7 +68,7 @@ def check(solid: TetMesh) -> None:
     np.testing.assert_allclose(shares, solid.tet_volumes, atol=1e-14 * solid.tet_volumes.max())
     assert new.n_tets == solid.n_tets + done.n_added_tets
     # What it is for.
-    assert len(boundary_joins(new)) == 0
+    assert len(overconstrained_elements(new)) == 0
     outside = new.boundary_index >= 0
     assert not outside[new.T].all(axis=1).any()
     assert np.bincount(new.boundary_tets).max() == 1
@@ -88,46 +88,46 @@ def test_corners_with_three_faces_outside():
     faces = list(range(0, solid.surface.n_faces, 7))
     spiky = capped(solid, faces)
     assert np.bincount(spiky.boundary_tets).max() == 3
-    assert len(boundary_joins(spiky).faces) > 0
+    assert len(overconstrained_elements(spiky).faces) > 0
     check(spiky)
     inner = cubes(shapes.box(4, 4, 4))
     check(capped(inner, [0, 9]))
 
 
-def test_joins_are_what_the_definition_says():
+def test_overconstrained_elements_are_what_the_definition_says():
     solid = capped(cubes(shapes.box(3, 3, 2)), [0, 4, 30])
-    edges, faces, tets = naive_joins(solid)
-    found = boundary_joins(solid)
+    edges, faces, tets = naive_overconstrained(solid)
+    found = overconstrained_elements(solid)
     assert {tuple(edge) for edge in found.edges.tolist()} == edges
     hidden = {f for f in faces if any(set(e) <= set(f) for e in edges)}
     assert {tuple(sorted(face)) for face in found.faces.tolist()} == faces - hidden
     named = {tuple(tet) for tet in solid.T[found.tets].tolist()}
     assert tets <= named
-    assert naive_joins(refine_boundary_joins(solid).solid) == (set(), set(), set())
+    assert naive_overconstrained(refine_overconstrained(solid).solid) == (set(), set(), set())
 
 
 def test_nothing_to_do_returns_the_input():
-    solid = refine_boundary_joins(cubes(shapes.RING)).solid
-    again = refine_boundary_joins(solid)
+    solid = refine_overconstrained(cubes(shapes.RING)).solid
+    again = refine_overconstrained(solid)
     assert again.solid is solid
     assert (again.n_split, again.n_added_tets) == (0, 0)
 
 
 def test_same_input_same_bits_and_relabelling():
     solid = capped(cubes(shapes.RING), [3, 8])
-    first, second = refine_boundary_joins(solid), refine_boundary_joins(solid)
+    first, second = refine_overconstrained(solid), refine_overconstrained(solid)
     np.testing.assert_array_equal(first.solid.T, second.solid.T)
     rng = np.random.default_rng(0)
     rank = rng.permutation(solid.n_vertices).astype(np.int32)
     points = np.empty_like(solid.V)
     points[rank] = solid.V
-    other = refine_boundary_joins(TetMesh(points, rank[solid.T[rng.permutation(solid.n_tets)]]))
+    other = refine_overconstrained(TetMesh(points, rank[solid.T[rng.permutation(solid.n_tets)]]))
     assert other.n_split == first.n_split
     check(TetMesh(points, rank[solid.T]))
 
 
 def test_prolong_wants_one_row_per_input_vertex():
-    done = refine_boundary_joins(cubes(shapes.RING))
+    done = refine_overconstrained(cubes(shapes.RING))
     with pytest.raises(ArrayError):
         done.prolong(np.zeros(3))
 
@@ -138,12 +138,12 @@ def test_bad_solids_are_refused():
     third = np.vstack([solid.T, *([*face, solid.n_vertices + k] for k in range(2))])
     points = np.vstack([solid.V, [[9, 9, 9], [8, 8, 8]]])
     with pytest.raises(NonManifoldError) as caught:
-        refine_boundary_joins(TetMesh(points, third))
+        refine_overconstrained(TetMesh(points, third))
     assert 0 in caught.value.ids
 
 
 @pytest.mark.parametrize("name", JIGSAW)
 def test_meshes_with_slivers(name, load_solid):
     solid = load_solid(name)
-    assert len(boundary_joins(solid)) > 0
+    assert len(overconstrained_elements(solid)) > 0
     check(solid)
