@@ -57,12 +57,13 @@ def mesh_ready(case: Case) -> str:
 
 def failure(job: dict[str, Any], code: int, complaint: str) -> dict[str, Any]:
     """The record of a process that left none."""
-    if code in (-signal.SIGXCPU, -signal.SIGKILL):
-        reason = f"killed at its limit of {1e3 * job['per_element']:g} ms per element"
+    killed = code in (-signal.SIGXCPU, -signal.SIGKILL, -signal.SIGALRM)
+    if killed:
+        reason = complaint or f"killed at {1e3 * job['per_element']:g} ms of processor per element"
     else:
         reason = f"the process ended with {code}: {complaint}"
     kept = {key: job[key] for key in ("kind", "group", "name", "seed", "size")}
-    return {**kept, "certified": False, "converged": False, "reason": reason, "killed": True}
+    return {**kept, "certified": False, "converged": False, "reason": reason, "killed": killed}
 
 
 def run_case(case: Case, job: dict[str, Any], threads: int, script: Path) -> dict[str, Any]:

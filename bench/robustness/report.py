@@ -62,12 +62,11 @@ def table(records: list[Record]) -> str:
     return markdown(["", *names], rows)
 
 
-def failures(records: list[Record]) -> str:
-    """A row for each record that is not certified."""
-    failed = [r for r in records if not r["certified"]]
-    if not failed:
+def reasons(records: list[Record]) -> str:
+    """A row for each of the records, which are those that failed."""
+    if not records:
         return "None.\n"
-    rows = [[r["group"], r["name"], str(r.get("reason", ""))[:_LONGEST]] for r in failed]
+    rows = [[r["group"], r["name"], str(r.get("reason", ""))[:_LONGEST]] for r in records]
     return markdown(["", "seed or file", "reason"], rows)
 
 
