@@ -1,0 +1,38 @@
+"""Sphinx: python -m sphinx -W docs build/site"""
+
+from __future__ import annotations
+
+import stretchmap
+
+project = "stretchmap"
+author = "The stretchmap developers"
+copyright = "the stretchmap developers"
+release = version = stretchmap.__version__
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx_gallery.gen_gallery",
+]
+html_theme = "pydata_sphinx_theme"
+html_title = f"stretchmap {release}"
+html_theme_options = {"navigation_with_keys": False, "show_prev_next": False}
+exclude_patterns = ["results.md", "release.md"]
+myst_enable_extensions = ["dollarmath", "amsmath"]
+myst_heading_anchors = 3
+
+autosummary_generate = True
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "matplotlib_animations": False,
+    "abort_on_example_error": True,
+    "show_memory": False,
+    "reset_modules": (),
+}
