@@ -46,6 +46,8 @@ _EXPORTS = {
     "distortion": "measures.elements",
     "certify": "certificate.checks",
     "certify_file": "certificate.checks",
+    "compare": "certificate.comparison",
+    "Comparison": "certificate.comparison",
     "load_map": "maps.files",
     "PointMap": "maps.points",
     "partition": "partitions.parts",

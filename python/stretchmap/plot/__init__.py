@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import FileFormatError, OptionError
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
+from .comparisons import comparison
 from .pairs import registration
 from .solids import cutaway, levels
 from .statistics import convergence, ratios
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = [
     "KINDS",
     "checkerboard",
+    "comparison",
     "convergence",
     "cutaway",
     "domain",
