@@ -37,11 +37,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import as_points, describe
+from ..base.arrays import as_reals, describe
+from ..base.options import instance, real
 from ..base.torus import TWO_PI, Torus
-from ..errors import ArrayError, MeshError, OptionError
+from ..errors import MeshError
 from ..maps.files import load_map
 from ..measures.orientation import chart_areas, outward_areas
+from ..mesh.given import as_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .findings import MOST_IDS, Certificate, Findings
 
@@ -81,17 +83,17 @@ def certify(
     Raises
     ------
     ArrayError
-        If ``image`` has the wrong shape.
+        If ``image`` has the wrong shape or holds no real numbers.
     NonFiniteError
         If it holds a NaN or an infinity.
     OptionError
-        If the tolerance is negative.
+        If the tolerance is negative or not finite.
     """
-    if not tolerance >= 0.0:
-        raise OptionError(f"tolerance must not be negative, got {tolerance}")
-    points = as_points(image, "image")
-    if points.shape != mesh.V.shape:
-        raise ArrayError(f"image must have shape {mesh.V.shape}, got {points.shape}")
+    mesh = as_mesh(mesh)
+    tolerance = real("tolerance", tolerance, 0.0)
+    if torus is not None:
+        instance("torus", torus, Torus, "Torus(R, r)")
+    points = as_reals(image, "image", mesh.V.shape)
     found = Findings()
     if not _topology(found, mesh):
         return found.certificate("")
@@ -134,6 +136,8 @@ def certify_file(
     OSError
         If it cannot be opened.
     """
+    if torus is not None:
+        instance("torus", torus, Torus, "Torus(R, r)")
     loaded = load_map(path)
     return certify(loaded.mesh, loaded.image, torus or loaded.torus, tolerance=tolerance)
 

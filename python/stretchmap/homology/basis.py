@@ -13,15 +13,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import read_only
+from ..base.arrays import as_integers, read_only
 from ..base.files import atomic_path
 from ..base.tables import table
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms, solve_harmonic
 from ..io.npz import save_npz
+from ..mesh.given import as_solid, as_surface
 from .bounding import bounding_by_linking, bounding_in, least_skew_longitude, same_lattice
 from .integer import integer_inverse, reduced_basis
 
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from ..mesh.meshes import TetMesh, TriMesh
 
 __all__ = ["HomologyBasis", "homology_basis"]
+
+# The search for a shortest loop walks round as often as the class says.
+_MOST_TURNS = 100
 
 logger = logging.getLogger("stretchmap")
 
@@ -129,13 +133,14 @@ class HomologyBasis:
             return self.tunnel_loops[0]
         return self._shortest_loop(self.torus_classes[0], self.handle_loops)
 
-    def shortest_loop(self, coefficients: NDArray[np.int64]) -> NDArray[np.int32]:
+    def shortest_loop(self, coefficients: ArrayLike) -> NDArray[np.int32]:
         """Shortest loop of edges in a homology class.
 
         Parameters
         ----------
-        coefficients : (2g,) array of int
-            The class over ``generators``, not zero.
+        coefficients : (2g,) array_like of int
+            The class over ``generators``, not zero; none beyond 100 either way, since the loop goes
+            round that often and the time to find it grows faster still.
 
         Returns
         -------
@@ -146,12 +151,15 @@ class HomologyBasis:
         Raises
         ------
         ArrayError
-            The class is zero or has the wrong length.
+            The class is zero, has the wrong length or no integers.
+        IndexRangeError
+            A coefficient beyond 100; ``ids`` are their places.
         """
-        coefficients = np.asarray(coefficients)
-        if coefficients.shape != (2 * self.genus,) or not coefficients.any():
+        shape = (2 * self.genus,)
+        target = as_integers(coefficients, "coefficients", shape, -_MOST_TURNS, _MOST_TURNS)
+        if not target.any():
             raise ArrayError(f"a class is {2 * self.genus} integers, not all zero")
-        return self._shortest_loop(coefficients, ())
+        return self._shortest_loop(target, ())
 
     def _shortest_loop(
         self, target: NDArray[np.int64], known: tuple[NDArray[np.int32], ...]
@@ -168,20 +176,32 @@ class HomologyBasis:
         )
         return read_only(np.array(loop, dtype=np.int32))
 
-    def length(self, loop: NDArray[np.int32]) -> float:
-        """Length of a closed polygon through vertices of the surface, in units of ``V``."""
-        points = self.surface.V[np.asarray(loop)]
+    def length(self, loop: ArrayLike) -> float:
+        """Length of a closed polygon through vertices of the surface, in units of ``V``.
+
+        Raises
+        ------
+        ArrayError, IndexRangeError
+            The loop is no array (k,) of vertices.
+        """
+        points = self.surface.V[self._vertices(loop)]
         return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
 
-    def classes(self, loop: NDArray[np.int32]) -> NDArray[np.int64]:
+    def classes(self, loop: ArrayLike) -> NDArray[np.int64]:
         """Class (2g,) of a loop of edges over ``generators``: its periods, exact.
 
         Raises
         ------
         ArrayError
-            Two consecutive vertices are not joined by an edge.
+            The loop is no array (k,), or two consecutive vertices are not joined by an edge.
+        IndexRangeError
+            No vertex of the surface; ``ids`` are the places in the loop.
         """
-        return _core.homology.periods(self.surface.topology, self.dual_forms, loop).astype(np.int64)
+        ids = self._vertices(loop).astype(np.int32)
+        return _core.homology.periods(self.surface.topology, self.dual_forms, ids).astype(np.int64)
+
+    def _vertices(self, loop: ArrayLike) -> NDArray[np.int64]:
+        return as_integers(loop, "loop", (None,), 0, self.surface.n_vertices - 1)
 
     def require_torus(self) -> None:
         """Check that the genus is one.
@@ -281,6 +301,9 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
     Signs: the pair longitude, meridian may be turned round as a whole; only its orientation with
     respect to the outward normal is fixed.
     """
+    surface = as_surface(surface)
+    if solid is not None:
+        solid = as_solid(solid)
     surface.require_closed()
     top = surface.topology
     lists, forms = _core.homology.tree_cotree(top, _core.mesh.edge_lengths(top, surface.V))

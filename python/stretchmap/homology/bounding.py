@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..errors import ArrayError, GenusError, SelfIntersectionError
+from ..errors import GenusError, SelfIntersectionError
+from ..mesh.given import require_same_mesh
 from .integer import complement, integer_inverse, integer_kernel
 
 if TYPE_CHECKING:
@@ -44,12 +45,8 @@ def bounding_in(
     solid: TetMesh, surface: TriMesh, loops: list[NDArray[np.int32]]
 ) -> NDArray[np.int64]:
     """Basis of the classes over ``loops`` on which every class of H^1(solid) vanishes."""
-    own = solid.surface
-    if own.F.shape != surface.F.shape or not np.array_equal(own.F, surface.F):
-        raise ArrayError(
-            "the surface is not the boundary of the solid; pass solid.surface (its vertices are "
-            "solid.boundary_vertices)"
-        )
+    fault = "the surface is not the boundary of the solid"
+    require_same_mesh(solid.surface, surface, fault, "pass solid.surface")
     relations, values = _core.homology.solid_cohomology(
         solid.T, solid.edges, solid.n_vertices, [solid.boundary_vertices[loop] for loop in loops]
     )

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import as_points, read_only
-from ..errors import ArrayError, OptionError
+from ..base.arrays import as_indices, as_points, as_reals, read_only
+from ..base.options import real
+from ..errors import ArrayError, KindError, OptionError
+from ..mesh.meshes import TetMesh, TriMesh
 
 if TYPE_CHECKING:
     from ..base.torus import Torus
-    from ..mesh.meshes import TetMesh, TriMesh
 
 __all__ = ["CarriesPoints", "Located", "PointMap"]
 
@@ -49,8 +50,9 @@ class Located:
 
         Parameters
         ----------
-        T : ndarray of int32, shape (k, 4)
-            Tets of the mesh.
+        T : array_like of int, shape (k, 4)
+            Tets of the mesh the points were found in: the source of `PointMap.forward` and
+            `PointMap.inverse` alike.
         values : array_like, shape (m,) or (m, c)
             One row per vertex.
 
@@ -58,8 +60,20 @@ class Located:
         -------
         ndarray, shape (n,) or (n, c)
             NaN outside.
+
+        Raises
+        ------
+        ArrayError, IndexRangeError, NonFiniteError
+            No such arrays, or too few tets for the points that were found in them.
         """
-        return _interpolate(np.asarray(values, float), T, self.tets, self.weights)
+        shape = (None,) if np.ndim(values) != 2 else (None, None)
+        reals = as_reals(values, "values", shape)
+        tets = as_indices(T, 4, len(reals), "T")
+        if self.tets.max(initial=-1) >= len(tets):
+            raise ArrayError(
+                f"the points were found in a mesh of more than {len(tets)} tets; T is another's"
+            )
+        return _interpolate(reals, tets, self.tets, self.weights)
 
 
 class PointMap:
@@ -78,8 +92,8 @@ class PointMap:
 
     Raises
     ------
-    ArrayError
-        If the map is that of a surface.
+    KindError
+        If it is no map, or that of a surface.
     NonFiniteError
         If the image has NaN or infinite coordinates.
     OptionError
@@ -92,13 +106,13 @@ class PointMap:
     """
 
     def __init__(self, result: CarriesPoints, tolerance: float = 1e-9) -> None:
-        if not hasattr(result.mesh, "T"):
-            raise ArrayError("points are carried by maps of solids; this is the map of a surface")
-        if not (tolerance >= 0.0 and np.isfinite(tolerance)):
-            raise OptionError(f"tolerance must be finite and not negative, got {tolerance}")
-        self._T = result.mesh.T
-        self._ends = (result.mesh.V, as_points(result.image, "image"))
-        self._tolerance = tolerance
+        mesh = getattr(result, "mesh", None)
+        if not isinstance(mesh, TetMesh):
+            what = "the map of a surface" if isinstance(mesh, TriMesh) else type(result).__name__
+            raise KindError(f"points are carried by maps of solids; this is {what}")
+        self._T = mesh.T
+        self._ends = (mesh.V, as_points(result.image, "image"))
+        self._tolerance = real("tolerance", tolerance, 0.0)
         self._locators: list[_core.maps.TetLocator | None] = [None, None]
 
     def __getstate__(self) -> dict[str, Any]:

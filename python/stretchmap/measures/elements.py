@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import read_only
+from ..base.arrays import as_reals, read_only
+from ..base.options import instance
 from ..base.tables import plain, table
 from ..base.torus import Torus
-from ..errors import ArrayError, DegenerateError, NonFiniteError, OptionError, OrientationError
+from ..errors import DegenerateError, OptionError, OrientationError
+from ..mesh.given import as_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .orientation import chart_areas, outward_areas
 
@@ -132,7 +134,7 @@ def distortion(
     Raises
     ------
     ArrayError
-        If ``image`` or ``angles`` has the wrong shape.
+        If ``image`` or ``angles`` has the wrong shape or holds no real numbers.
     NonFiniteError
         If ``image`` or ``angles`` holds a NaN or an infinity; ``ids`` are the vertices.
     DegenerateError
@@ -148,7 +150,10 @@ def distortion(
     Without ``torus`` or ``angles`` the orientation of a surface's image is not known: its areas are
     taken as positive and ``flips`` is None.
     """
-    points = _vertex_array(image, len(mesh.V), 3, "image")
+    mesh = as_mesh(mesh)
+    points = as_reals(image, "image", (len(mesh.V), 3))
+    if torus is not None:
+        instance("torus", torus, Torus, "Torus(R, r)")
     if isinstance(mesh, TetMesh):
         oriented = True
         elements = mesh.T
@@ -204,16 +209,6 @@ def distortion(
     )
 
 
-def _vertex_array(values: ArrayLike, n: int, columns: int, name: str) -> NDArray[np.float64]:
-    array = np.ascontiguousarray(values, dtype=float)
-    if array.shape != (n, columns):
-        raise ArrayError(f"{name} must have shape ({n}, {columns}), got {array.shape}")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(bad):
-        raise NonFiniteError(f"{name} is not finite at {len(bad)} vertices", bad)
-    return array
-
-
 def _check_source(source: NDArray[np.float64]) -> None:
     if not len(source):
         raise DegenerateError("the mesh has no elements")
@@ -241,7 +236,7 @@ def _orientation(
     if torus is not None and angles is not None:
         raise OptionError("give torus or angles as the reference of orientation, not both")
     if angles is not None:
-        return np.sign(chart_areas(mesh.F, _vertex_array(angles, len(mesh.V), 2, "angles")))
+        return np.sign(chart_areas(mesh.F, as_reals(angles, "angles", (len(mesh.V), 2))))
     if torus is None:
         return None
     return np.sign(outward_areas(image, mesh.F, torus))

@@ -66,7 +66,7 @@ def require_same_mesh(
     ----------
     first, second : TriMesh or TetMesh
     what : str
-        What belongs to the second and not to the first, for the message.
+        The fault in words, such as "the basis is of another mesh"; how they differ is added.
     remedy : str
 
     Raises
@@ -77,7 +77,9 @@ def require_same_mesh(
     if first is second:
         return
     if type(first) is not type(second):
-        raise KindError(f"{what} is of a {type(second).__name__}; {remedy}")
+        raise KindError(
+            f"{what}: a {type(second).__name__} against a {type(first).__name__}; {remedy}"
+        )
     key = "T" if isinstance(first, TetMesh) else "F"
     for name in ("V", key):
         ours, theirs = getattr(first, name), getattr(second, name)
@@ -85,7 +87,7 @@ def require_same_mesh(
             how = f"{len(theirs)} rows of {name} against {len(ours)}"
             if ours.shape == theirs.shape:
                 how = f"{int((ours != theirs).any(axis=1).sum())} rows of {name} differ"
-            raise KindError(f"{what} is of another mesh: {how}; {remedy}")
+            raise KindError(f"{what}: {how}; {remedy}")
 
 
 def _remedy(mesh: Any, wanted: str, made_by: str) -> str:

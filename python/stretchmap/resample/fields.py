@@ -9,7 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from ..base.arrays import as_reals
+from ..base.options import one_of
 from ..errors import DegenerateError, OptionError
+from ..maps.given import as_map_of_solid
 
 if TYPE_CHECKING:
     from ..maps.files import LoadedMap
@@ -59,14 +61,17 @@ def transfer(
         If ``values`` holds a NaN or an infinity; ``ids`` are the rows.
     OptionError
         If an option is unknown or the map is no registration.
+    KindError
+        If it is no map of a solid.
     DegenerateError
         If a tet of source or target has no positive volume; ``ids`` are the tets.
     """
-    solid, target = registration.solid, getattr(registration, "target", None)
-    if solid is None or target is None:
+    _, solid = as_map_of_solid(registration, "carrying a field")
+    target = getattr(registration, "target", None)
+    if target is None:
         raise OptionError("a field is carried by a registration; this map has no target solid")
-    if conserve not in ("integral", "mean") or per not in ("vertex", "tet"):
-        raise OptionError(f"conserve is integral or mean, per is vertex or tet: {conserve}, {per}")
+    one_of("conserve", conserve, ("integral", "mean"))
+    one_of("per", per, ("vertex", "tet"))
     for mesh, name in ((solid, "source"), (target, "target")):
         flat = np.flatnonzero(~(mesh.tet_volumes > 0.0))
         if len(flat):

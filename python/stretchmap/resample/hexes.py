@@ -20,10 +20,12 @@ from scipy.spatial import cKDTree
 from .. import _core
 from ..base.arrays import read_only
 from ..base.files import atomic_path
+from ..base.options import flag, memory, whole
 from ..base.progress import Progress
 from ..base.tables import plain, table
 from ..base.torus import TWO_PI, Torus
-from ..errors import FileFormatError, MissingDependencyError, OptionError, SolverError
+from ..errors import FileFormatError, MissingDependencyError, SolverError
+from ..maps.given import as_map_of_solid, torus_of
 from ..registration.flat_torus import FlatSurface
 from .o_grid import o_grid
 from .quality import corner_tets, hex_volumes, jacobians
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 __all__ = ["HexMesh", "hex_mesh"]
 
 _BISECTIONS = 40
+_MOST = 100_000  # hexahedra in any direction
+_BYTES_PER_HEX = 2500  # at the peak, with the repair
 _LEAST = 0.05  # least scaled Jacobian of a grid that is not repaired
 
 
@@ -182,19 +186,24 @@ def hex_mesh(
     Raises
     ------
     OptionError
-        If a number is too small or the map has no torus.
-    ArrayError
-        If the map is that of a surface.
+        If a number is too small or the grid too large for the memory there is, or the map has no
+        torus.
+    KindError
+        If it is no map, or that of a surface.
     SolverError
         If the core of the torus lies outside the image, or the repair fails; then ``ids`` are the
         hexahedra that are left.
     """
-    if sections < 3 or block < 1 or rings < 1:
-        raise OptionError(
-            f"a grid needs sections >= 3, block >= 1, rings >= 1, got {sections}, {block}, {rings}"
-        )
-    if result.torus is None:
-        raise OptionError("the map has no torus to lay a grid in")
+    result, _ = as_map_of_solid(result, "a grid of hexahedra")
+    torus = torus_of(result)
+    sections, block, rings = (
+        whole("sections", sections, 3, _MOST),
+        whole("block", block, 1, _MOST),
+        whole("rings", rings, 1, _MOST),
+    )
+    count = sections * block * (block + 4 * rings)
+    memory(f"a grid of {count} hexahedra", _BYTES_PER_HEX * count)
+    repair = flag("repair", repair)
     points = result.point_map
     disk, quads, outer = o_grid(block, rings)
     n = len(disk)
@@ -204,9 +213,9 @@ def hex_mesh(
     here, there = (n * np.arange(sections)[:, None, None], None)
     there = n * ((np.arange(sections) + 1) % sections)[:, None, None]
     H = np.concatenate([quads[None] + here, quads[None] + there], axis=2).reshape(-1, 8)
-    reach = _reach(points, result.torus, u, v)
+    reach = _reach(points, torus, u, v)
     ids = (n * np.arange(sections)[:, None] + outer).ravel()
-    grid = result.torus.xi(u, v, share * reach)
+    grid = torus.xi(u, v, share * reach)
     located = points.inverse(grid)
     lost = np.flatnonzero(~located.inside)
     if len(lost):
@@ -235,7 +244,7 @@ def hex_mesh(
         V=read_only(V),
         H=read_only(H),
         grid=read_only(grid),
-        coordinates=read_only(np.stack(result.torus.coordinates(grid), axis=-1)),
+        coordinates=read_only(np.stack(torus.coordinates(grid), axis=-1)),
         jacobians=read_only(quality),
         volumes=read_only(volumes),
         volume_ratios=read_only(volumes / volumes.sum() / shares),

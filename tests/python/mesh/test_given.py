@@ -40,13 +40,13 @@ def test_what_is_none_is_refused_with_a_remedy(convert, given, words):
 
 def test_the_same_mesh():
     again = TetMesh(SOLID.V, SOLID.T)
-    require_same_mesh(SOLID, again, "the basis", "leave it out")
+    require_same_mesh(SOLID, again, "the basis is of another mesh", "leave it out")
     moved = SOLID.V.copy()
     moved[[3, 5]] += 1.0
     for other, words in (
         (TetMesh(moved, SOLID.T), "the basis is of another mesh: 2 rows of V differ; leave it out"),
         (TetMesh(SOLID.V, SOLID.T[1:]), "rows of T against"),
-        (SOLID.surface, "the basis is of a TriMesh"),
+        (SOLID.surface, "the basis is of another mesh: a TriMesh against a TetMesh"),
     ):
         with pytest.raises(KindError, match=words):
-            require_same_mesh(SOLID, other, "the basis", "leave it out")
+            require_same_mesh(SOLID, other, "the basis is of another mesh", "leave it out")
