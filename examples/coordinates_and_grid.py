@@ -13,7 +13,7 @@ from stretchmap.samples import vertebra_like
 
 solid = vertebra_like(12_000)
 result = sm.volume_map(solid)
-points = result.solid.V[result.solid.T].mean(axis=1)
+points = result.mesh.V[result.mesh.T].mean(axis=1)
 u, v, s = result.coordinates(points).T
 print(f"{len(points)} points: s / r from {s.min() / result.torus.r:.3f} to "
       f"{s.max() / result.torus.r:.3f}")  # fmt: skip

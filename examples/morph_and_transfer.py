@@ -15,8 +15,8 @@ from stretchmap.samples import vertebra_pair
 pair = vertebra_pair(n_landmarks=24, n_tets=(6000, 8000))
 result = sm.register(pair.source, pair.target, (pair.source_landmarks, pair.target_landmarks))
 
-density = 1.0 + np.exp(-((result.solid.V[:, 0] - 2.0) ** 2))
-integral = (result.solid.tet_volumes * density[result.solid.T].mean(axis=1)).sum()
+density = 1.0 + np.exp(-((result.mesh.V[:, 0] - 2.0) ** 2))
+integral = (result.mesh.tet_volumes * density[result.mesh.T].mean(axis=1)).sum()
 carried = transfer(result, density)
 print(f"integral {integral:.6f} before, {(pair.target.tet_volumes * carried).sum():.6f} after")
 assert np.isclose((pair.target.tet_volumes * carried).sum(), integral, rtol=1e-12)

@@ -41,7 +41,7 @@ def of_ratios(ratios: NDArray[np.float64]) -> dict[str, float]:
 
 def of_solid_map(given: TetMesh, result: Any) -> dict[str, Any]:
     """Figures of a volume map; ``given`` is the solid that was asked for."""
-    solid, image = result.solid, np.asarray(result.image)
+    solid, image = result.mesh, np.asarray(result.image)
     n = given.n_vertices
     figures = of_ratios(result.distortion.ratios)
     figures["quasi_isometry"] = float(quasi_isometry(solid, image).max())

@@ -31,13 +31,13 @@ def map_fill(solid: sm.TetMesh, job: dict[str, Any]) -> tuple[Any, dict[str, Any
     boundary = prescribed(job["mesh"], job["name"].split("/")[1], solid)
     result = sm.fill(solid, boundary, keep_best=True)
     n = solid.n_vertices
-    proof = sm.certify(result.solid, result.image)
+    proof = sm.certify(result.mesh, result.image)
     found = figures.of_solid_map(solid, result)
     return result, found | {
         "certified": proof.certified,
         "reason": "" if proof.certified else proof.reason,
         "boundary_exact": np.array_equal(result.image[:n][solid.boundary_vertices], boundary),
-        "boundary_split": result.solid.surface.n_faces != solid.surface.n_faces,
+        "boundary_split": result.mesh.surface.n_faces != solid.surface.n_faces,
     }
 
 

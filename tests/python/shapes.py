@@ -65,6 +65,12 @@ def torus(nu: int = 12, nv: int = 8) -> tuple[NDArray[np.float64], NDArray[np.in
 def a_map(solid, image, torus=None):
     """A map file's content made of a solid and an image."""
     return LoadedMap(
-        solid=solid, surface=None, image=image, torus=torus, arrays={}, meta={}, history=(),
-        converged=True, stop_reason="", seconds={},
-    )  # fmt: skip
+        mesh=solid,
+        image=image,
+        torus=torus,
+        arrays={},
+        meta={},
+        converged=True,
+        stop_reason="",
+        seconds={},
+    )

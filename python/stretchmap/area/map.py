@@ -5,9 +5,8 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,7 @@ from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import OptionError
-from ..maps.history import IterationRecord
 from ..maps.result import MapResult
-from ..measures.elements import Distortion, distortion
 from .finish import finish_areas
 from .search import search_phase
 from .sem import minimize_stretch, start_angles
@@ -35,13 +32,13 @@ __all__ = ["AreaMap", "area_map"]
 _log = logging.getLogger("stretchmap")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class AreaMap(MapResult):
     """An area-preserving map onto a torus of revolution.
 
     Attributes
     ----------
-    surface : TriMesh
+    mesh : TriMesh
         The source.
     angles : ndarray, shape (n, 2)
         Angles (u, v) of the image in radians, not reduced to one turn: ``2 pi forms + d angles`` is
@@ -68,20 +65,14 @@ class AreaMap(MapResult):
         Wall-clock time per stage.
     """
 
-    title = "area"
+    _title: ClassVar[str] = "area"
 
-    surface: TriMesh
-    angles: NDArray[np.float64]
-    image: NDArray[np.float64]
-    torus: Torus
+    mesh: TriMesh
+    torus: Torus = field()
+    angles: NDArray[np.float64] = field(repr=False)
     phase: float
     ratio: float
     forms: NDArray[np.int32] = field(repr=False)
-    history: tuple[IterationRecord, ...] = field(repr=False)
-    distortion: Distortion
-    converged: bool
-    stop_reason: str
-    seconds: Mapping[str, float]
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """``angles`` (n, 2) and ``forms`` (2, e)."""
@@ -219,7 +210,7 @@ def area_map(
     if not converged:
         _log.warning("area map: %s", reason)
     return AreaMap(
-        surface=surface,
+        mesh=surface,
         angles=read_only(angles),
         image=read_only(image),
         torus=torus,
@@ -227,7 +218,6 @@ def area_map(
         ratio=ratio,
         forms=conformal.forms,
         history=tuple(history),
-        distortion=distortion(surface, image, angles=angles),
         converged=converged,
         stop_reason=reason,
         seconds=seconds,

@@ -245,9 +245,10 @@ def _solid_torus(path: Path, orient: bool, compact: bool) -> TetMesh:
 
 def _solid_map(path: Path, command: str) -> LoadedMap:
     from ..maps.files import load_map
+    from ..mesh.meshes import TetMesh
 
     loaded = load_map(path)
-    if loaded.solid is None:
+    if not isinstance(loaded.mesh, TetMesh):
         raise MeshError(f"{path} holds the map of a surface, '{command}' needs that of a solid")
     return loaded
 

@@ -267,15 +267,16 @@ def resumed(solid: TetMesh, loaded: LoadedMap, path: Path) -> tuple[TetMesh, Any
     import numpy as np
 
     from ..errors import MeshError
+    from ..mesh.meshes import TetMesh
 
-    n = solid.n_vertices
-    if loaded.solid is None or loaded.torus is None:
+    n, mesh = solid.n_vertices, loaded.mesh
+    if not isinstance(mesh, TetMesh) or loaded.torus is None:
         raise MeshError(f"{path} is no map of a solid onto a solid torus with known radii")
-    if not np.array_equal(loaded.solid.V[:n], solid.V):
+    if not np.array_equal(mesh.V[:n], solid.V):
         raise MeshError(f"{path} is not a map of this solid: its vertices are others")
-    if loaded.solid.n_vertices == n and not np.array_equal(loaded.solid.T, solid.T):
+    if mesh.n_vertices == n and not np.array_equal(mesh.T, solid.T):
         raise MeshError(f"{path} is not a map of this solid: its tets are others")
-    return loaded.solid, loaded.image, loaded.torus
+    return mesh, loaded.image, loaded.torus
 
 
 def conclude(
@@ -284,14 +285,12 @@ def conclude(
     """Certify if that has not been done, write output and report, print the table."""
     from ..base.tables import table
 
-    certificate = getattr(result, "certificate", None)
-    if certificate is None:
-        certificate = _certified(result)
-        watch.lap("certificate")
     report = result.to_dict(history=True)
-    report["certified"] = certificate.certified
-    report["reason"] = certificate.reason
-    report["certificate"] = certificate.to_dict()
+    if "certificate" not in report:
+        certificate = _certified(result)
+        report |= {"certified": certificate.certified, "certificate": certificate.to_dict()}
+        watch.lap("certificate")
+    report["reason"] = report["certificate"]["reason"]
     report["seconds"] = watch.seconds()
     common.write_together(output, result.save, json_path, report)
     if not quiet:

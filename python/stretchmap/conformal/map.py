@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,25 +17,21 @@ from ..errors import OptionError
 from ..forms.harmonic import WEIGHTS, HarmonicForms
 from ..homology.basis import HomologyBasis, homology_basis
 from ..homology.representatives import harmonic_forms
-from ..maps.history import IterationRecord
 from ..maps.result import MapResult
-
-if TYPE_CHECKING:
-    from ..measures.elements import Distortion
-    from ..mesh.meshes import TriMesh
+from ..mesh.meshes import TriMesh
 from .hodge import lattice_basis
 from .torus import conformal_torus, tube_angle
 
 __all__ = ["ConformalMap", "conformal_map"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ConformalMap(MapResult):
     """A discrete conformal map to a flat torus, and from there to a torus of revolution.
 
     Attributes
     ----------
-    surface : TriMesh
+    mesh : TriMesh
     basis : HomologyBasis
     forms : ndarray, shape (2, e), int32
         Integer closed 1-forms of the two coordinates: ``forms + d turns`` is harmonic.
@@ -65,10 +59,15 @@ class ConformalMap(MapResult):
         Angles (u, v) of the image in radians.
     image : ndarray, shape (n, 3)
         Points on ``torus``.
+    converged : bool
+        Whether the chart is free of folds; nothing is iterated.
+    stop_reason : str
     seconds : dict
     """
 
-    surface: TriMesh = field(repr=False)
+    _title: ClassVar[str] = "conformal map"
+
+    mesh: TriMesh = field(repr=False)
     basis: HomologyBasis = field(repr=False)
     forms: NDArray[np.int32] = field(repr=False)
     turns: NDArray[np.float64] = field(repr=False)
@@ -79,13 +78,8 @@ class ConformalMap(MapResult):
     conformal_energy: float
     weights: str
     chart_areas: NDArray[np.float64] = field(repr=False)
-    torus: Torus
+    torus: Torus = field()
     angles: NDArray[np.float64] = field(repr=False)
-    image: NDArray[np.float64] = field(repr=False)
-    seconds: Mapping[str, float]
-    history: tuple[IterationRecord, ...] = ()
-
-    title = "conformal map"
 
     @property
     def flips(self) -> int:
@@ -96,23 +90,6 @@ class ConformalMap(MapResult):
     def plane(self) -> NDArray[np.float64]:
         """(n, 2) planar map ``turns @ lattice``, defined modulo the rows of ``lattice``."""
         return self.turns @ self.lattice
-
-    @cached_property
-    def distortion(self) -> Distortion:
-        """Measures of the image on the torus of revolution."""
-        from ..measures.elements import distortion
-
-        return distortion(self.surface, self.image, torus=self.torus)
-
-    @property
-    def converged(self) -> bool:
-        """Whether the chart is free of folds; nothing is iterated."""
-        return self.flips == 0
-
-    @property
-    def stop_reason(self) -> str:
-        """What ``converged`` means here, in words."""
-        return "solved" if self.flips == 0 else f"solved, but {self.flips} faces are folded"
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """``angles`` and ``turns``, (n, 2) each, and ``lattice``."""
@@ -174,8 +151,9 @@ def conformal_map(
     torus = conformal_torus(aspect).with_area(surface.area)
     angles = np.column_stack([2.0 * np.pi * turns[:, 0], tube_angle(turns[:, 1], aspect)])
     image = torus.xi(angles[:, 0], angles[:, 1])
+    folds = int((areas <= 0.0).sum())
     return ConformalMap(
-        surface=surface,
+        mesh=surface,
         basis=basis,
         forms=basis.torus_forms,
         turns=read_only(turns),
@@ -189,6 +167,8 @@ def conformal_map(
         torus=torus,
         angles=read_only(angles),
         image=read_only(image),
+        converged=folds == 0,
+        stop_reason="solved" if folds == 0 else f"solved, but {folds} faces are folded",
         seconds={"homology": middle - start, "conformal": perf_counter() - middle},
     )
 

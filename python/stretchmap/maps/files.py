@@ -6,10 +6,8 @@ import dataclasses
 import json
 import os
 import zipfile
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,68 +15,40 @@ from numpy.typing import NDArray
 from ..base.arrays import as_points
 from ..base.torus import Torus
 from ..errors import FileFormatError
-
-if TYPE_CHECKING:
-    from ..measures.elements import Distortion
-    from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.meshes import TetMesh, TriMesh
 from .history import NAN, IterationRecord
 from .result import MapResult
 
 __all__ = ["LoadedMap", "load_map"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LoadedMap(MapResult):
     """A map read back from a file, whoever wrote it.
 
     Attributes
     ----------
-    solid, surface : TetMesh or TriMesh, or None
-        The source mesh; one of them is None.
-    image : ndarray, shape (n, 3)
+    mesh : TetMesh or TriMesh
+        The source mesh.
     torus : Torus or None
         None when the file names none.
+    target : TetMesh or None
+        The solid mapped to, of a registration.
     arrays : dict
         All further arrays of the file.
     meta : dict
         The scalars stored with it; empty for a file of another program.
-    history, converged, stop_reason, seconds
+    image, angles, history, converged, stop_reason, seconds
         As in the result that was saved.
     """
 
-    solid: TetMesh | None
-    surface: TriMesh | None
-    image: NDArray[np.float64]
-    torus: Torus | None
     arrays: dict[str, NDArray[Any]] = field(repr=False)
     meta: dict[str, Any] = field(repr=False)
-    history: tuple[IterationRecord, ...] = field(repr=False)
-    converged: bool
-    stop_reason: str
-    seconds: Mapping[str, float]
 
     @property
-    def title(self) -> str:  # type: ignore[override]
+    def title(self) -> str:
         """Kind of map, as stored."""
         return str(self.meta.get("kind", "map"))
-
-    @property
-    def distortion(self) -> Distortion:  # type: ignore[override]
-        """Measured anew from the mesh and the image."""
-        from ..measures.elements import distortion
-
-        angles = self.arrays.get("angles")
-        torus = self.torus if angles is None else None
-        return distortion(self.mesh, self.image, torus=torus, angles=angles)
-
-    @cached_property
-    def target(self) -> TetMesh | None:
-        """The solid mapped to; None if the file holds no registration."""
-        from ..mesh.meshes import TetMesh
-
-        if "target_V" not in self.arrays or "target_T" not in self.arrays:
-            return None
-        return TetMesh(self.arrays["target_V"], self.arrays["target_T"])
 
     def to_dict(self, history: bool = False) -> dict[str, Any]:
         """As `MapResult.to_dict`, with what else the file says, but for its certificate."""
@@ -108,8 +78,6 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     OSError
         If it cannot be opened.
     """
-    from ..mesh.meshes import TetMesh, TriMesh
-
     with open(path, "rb") as stream:
         if not zipfile.is_zipfile(stream):
             raise FileFormatError(f"{path} is not a readable .npz file")
@@ -127,16 +95,16 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     V, image = arrays.pop("V"), as_points(arrays.pop("image"), "image")
     if image.shape != V.shape:
         raise FileFormatError(f"{path}: image has shape {image.shape}, V {V.shape}")
-    solid = TetMesh(V, arrays.pop("T")) if "T" in arrays else None
-    surface = TriMesh(V, arrays.pop("F")) if "F" in arrays else None
+    mesh = TetMesh(V, arrays.pop("T")) if "T" in arrays else TriMesh(V, arrays.pop("F"))
     radii = arrays.pop("torus", None)
     if radii is not None and radii.shape != (2,):
         raise FileFormatError(f"{path}: torus must hold R and r, it has shape {radii.shape}")
     return LoadedMap(
-        solid=solid,
-        surface=surface,
+        mesh=mesh,
         image=image,
         torus=None if radii is None else Torus(*radii),
+        target=_target(arrays),
+        angles=arrays.get("angles"),
         arrays=arrays,
         meta=meta,
         history=_read_history(path, meta.get("history", [])),
@@ -144,6 +112,12 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
         stop_reason=str(meta.get("stop_reason", "read from a file")),
         seconds=meta.get("seconds", {}),
     )
+
+
+def _target(arrays: dict[str, NDArray[Any]]) -> TetMesh | None:
+    if "target_V" not in arrays or "target_T" not in arrays:
+        return None
+    return TetMesh(arrays["target_V"], arrays["target_T"])
 
 
 def _read_meta(path: object, meta: NDArray[Any] | None) -> dict[str, Any]:

@@ -7,22 +7,18 @@ back by finding the image tet; both directions use the barycentric coordinates t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import as_indices, as_points, as_reals, read_only
+from ..base.arrays import as_indices, as_points, as_reals
 from ..base.options import real
-from ..errors import ArrayError, KindError, OptionError
+from ..errors import ArrayError, KindError
 from ..mesh.meshes import TetMesh, TriMesh
 
-if TYPE_CHECKING:
-    from ..base.torus import Torus
-
-__all__ = ["CarriesPoints", "Located", "PointMap"]
+__all__ = ["Located", "PointMap"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +72,15 @@ class Located:
         return _interpolate(reals, tets, self.tets, self.weights)
 
 
+class ImageOfMesh(Protocol):
+    """What a `PointMap` needs of a map."""
+
+    @property
+    def mesh(self) -> TriMesh | TetMesh: ...
+    @property
+    def image(self) -> NDArray[np.float64]: ...
+
+
 class PointMap:
     """A map of a solid as a function of points, in both directions.
 
@@ -105,7 +110,7 @@ class PointMap:
     outside it by the height of the chord, far more than the tolerance.
     """
 
-    def __init__(self, result: CarriesPoints, tolerance: float = 1e-9) -> None:
+    def __init__(self, result: ImageOfMesh, tolerance: float = 1e-9) -> None:
         mesh = getattr(result, "mesh", None)
         if not isinstance(mesh, TetMesh):
             what = "the map of a surface" if isinstance(mesh, TriMesh) else type(result).__name__
@@ -158,70 +163,6 @@ class PointMap:
             tets=tets,
             weights=weights,
         )
-
-
-class CarriesPoints:
-    """What every map of a solid does with points; mixed into `MapResult`."""
-
-    if TYPE_CHECKING:
-        mesh: TriMesh | TetMesh
-        image: NDArray[np.float64]
-        torus: Torus | None
-
-    @cached_property
-    def point_map(self) -> PointMap:
-        """The map as a function of points, which also says what lies outside and in which tet."""
-        return PointMap(self)
-
-    def forward(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Carry points of the source solid through the map.
-
-        Parameters
-        ----------
-        points : array_like, shape (n, 3)
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            NaN for points outside the source; ``point_map.forward`` says more.
-
-        Raises
-        ------
-        ArrayError
-            If ``points`` does not have that shape, or the map is that of a surface.
-        NonFiniteError
-            If a coordinate is NaN or infinite.
-        """
-        return self.point_map.forward(points).points
-
-    def inverse(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Carry points of the image back to the source solid; as `forward`."""
-        return self.point_map.inverse(points).points
-
-    def coordinates(self, points: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Solid-torus coordinates (u, v, s) of (7.1).
-
-        Parameters
-        ----------
-        points : array_like, shape (n, 3), optional
-            Points of the source; its vertices if left out.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Angles u, v in [0, 2 pi) and the distance s from the centre circle; NaN outside.
-
-        Raises
-        ------
-        OptionError
-            If the map has no torus.
-        ArrayError, NonFiniteError
-            As `forward`.
-        """
-        if self.torus is None:
-            raise OptionError("the map has no torus, so there are no coordinates on it")
-        image = self.image if points is None else self.forward(points)
-        return read_only(np.stack(self.torus.coordinates(image), axis=-1))
 
 
 def _interpolate(

@@ -1,4 +1,4 @@
-"""What every result shares: iteration records, the table, JSON, and map files that come back.
+"""What all maps share: mesh and image, points carried along, the report, and files.
 
 A map file is an ``.npz`` with ``V``, ``F`` or ``T``, ``image`` (n, 3), ``torus`` (2,) with R and r
 where there is one, further named arrays, and ``meta``, a JSON text of all scalars, the history and
@@ -12,51 +12,69 @@ import dataclasses
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from .. import io
+from ..base.arrays import read_only
 from ..base.files import atomic_path
 from ..base.tables import plain, table, versions
 from ..base.torus import TWO_PI, Torus
-from .points import CarriesPoints
-
-if TYPE_CHECKING:
-    from ..measures.elements import Distortion
-    from ..mesh.meshes import TetMesh, TriMesh
+from ..errors import OptionError
+from ..io.npz import save_npz
+from ..measures.elements import Distortion, distortion
+from ..mesh.meshes import TetMesh, TriMesh
 from .history import IterationRecord
+from .points import PointMap
 
 __all__ = ["MapResult"]
 
 
-class MapResult(CarriesPoints):
-    """Mixin for the frozen dataclasses that hold a map.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MapResult:
+    """A piecewise-affine map, given by the image of each vertex.
 
-    The dataclass defines the attributes ``image (n, 3)``, ``torus`` (or None), ``history`` (tuple
-    of :class:`IterationRecord`), ``distortion``, ``converged``, ``stop_reason``, ``seconds`` (dict
-    from stage to seconds), and its source mesh as ``solid`` or ``surface``. It may define
-    ``certificate`` and ``energy``, and overrides :meth:`extra_arrays` and :meth:`extra_scalars`
-    for what is its own.
+    Attributes
+    ----------
+    mesh : TriMesh or TetMesh
+        The mesh the map starts from.
+    image : ndarray, shape (n, 3)
+        Image of each of its vertices.
+    torus : Torus or None
+        The standard torus it goes to; None where it goes to another solid, or none is known.
+    target : TetMesh or None
+        The solid it goes to, if that is not the standard one.
+    angles : ndarray, shape (n, 2), or None
+        Of a map of a surface: (u, v) of the image in radians, any branch.
+    history : tuple of IterationRecord
+    converged : bool
+    stop_reason : str
+        Why the iterations ended, in words.
+    seconds : dict
+        Wall-clock time per stage.
     """
 
-    title = "map"
+    _title: ClassVar[str] = "map"
 
-    if TYPE_CHECKING:
-        image: NDArray[np.float64]
-        torus: Torus | None
-        history: tuple[IterationRecord, ...]
-        distortion: Distortion
-        converged: bool
-        stop_reason: str
-        seconds: Mapping[str, float]
+    mesh: TriMesh | TetMesh
+    image: NDArray[np.float64]
+    torus: Torus | None = None
+    target: TetMesh | None = field(default=None, repr=False)
+    angles: NDArray[np.float64] | None = field(default=None, repr=False)
+    history: tuple[IterationRecord, ...] = field(default=(), repr=False)
+    converged: bool
+    stop_reason: str
+    seconds: Mapping[str, float]
 
     @property
-    def mesh(self) -> TriMesh | TetMesh:
-        """The source mesh; row i of ``image`` is its vertex i."""
-        solid = getattr(self, "solid", None)
-        return self.surface if solid is None else solid  # type: ignore[attr-defined]
+    def title(self) -> str:
+        """What kind of map this is."""
+        return self._title
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """Further arrays to be kept in a map file, by name."""
@@ -66,6 +84,72 @@ class MapResult(CarriesPoints):
         """Further entries of the report, JSON-compatible, by name."""
         return {}
 
+    @cached_property
+    def distortion(self) -> Distortion:
+        """Measures of the map, see :func:`distortion`.
+
+        The image of a surface is oriented by ``angles``, else by ``torus``.
+        """
+        torus = self.torus if self.angles is None else None
+        return distortion(self.mesh, self.image, torus=torus, angles=self.angles)
+
+    @cached_property
+    def point_map(self) -> PointMap:
+        """The map as a function of points, which also says what lies outside and in which tet."""
+        return PointMap(self)
+
+    def forward(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Carry points of the source solid through the map.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            NaN for points outside the source; ``point_map.forward`` says more.
+
+        Raises
+        ------
+        KindError
+            If the map is that of a surface.
+        ArrayError
+            If ``points`` does not have that shape.
+        NonFiniteError
+            If a coordinate is NaN or infinite.
+        """
+        return self.point_map.forward(points).points
+
+    def inverse(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Carry points of the image back to the source solid; as `forward`."""
+        return self.point_map.inverse(points).points
+
+    def coordinates(self, points: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Solid-torus coordinates (u, v, s) of (7.1).
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3), optional
+            Points of the source; its vertices if left out.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Angles u, v in [0, 2 pi) and the distance s from the centre circle; NaN outside.
+
+        Raises
+        ------
+        OptionError
+            If the map has no torus.
+        ArrayError, NonFiniteError
+            As `forward`.
+        """
+        if self.torus is None:
+            raise OptionError("the map has no torus, so there are no coordinates on it")
+        image = self.image if points is None else self.forward(points)
+        return read_only(np.stack(self.torus.coordinates(image), axis=-1))
+
     def to_dict(self, history: bool = False) -> dict[str, Any]:
         """Everything scalar about the map, ready for JSON.
 
@@ -74,14 +158,12 @@ class MapResult(CarriesPoints):
         history : bool
             Add the list of iteration records.
         """
-        mesh = self.mesh
         d = self.distortion
-        energy = getattr(self, "energy", None)
         out: dict[str, Any] = {
             "kind": self.title,
-            "n_vertices": len(mesh.V),
-            "n_elements": len(elements(mesh)),
-            "element": "tet" if hasattr(mesh, "T") else "face",
+            "n_vertices": len(self.mesh.V),
+            "n_elements": len(elements(self.mesh)),
+            "element": "tet" if isinstance(self.mesh, TetMesh) else "face",
             "flips": d.flips,
             "ring_mean": d.ring_mean,
             "ring_std": d.ring_std,
@@ -93,7 +175,7 @@ class MapResult(CarriesPoints):
             "total_distortion": d.total_distortion,
             "angle_mean": d.angle_mean,
             "angle_max": d.angle_max,
-            "energy": d.stretch_energy if energy is None else energy,
+            "energy": d.stretch_energy,
             "energy_bound": d.stretch_bound,
             "iterations": sum(1 for record in self.history if record.iteration > 0),
             "converged": self.converged,
@@ -101,12 +183,8 @@ class MapResult(CarriesPoints):
             "seconds": dict(self.seconds),
             "torus": None if self.torus is None else {"R": self.torus.R, "r": self.torus.r},
             "versions": versions(),
+            **self.extra_scalars(),
         }
-        certificate = getattr(self, "certificate", None)
-        if certificate is not None:
-            out["certified"] = certificate.certified
-            out["certificate"] = certificate.to_dict()
-        out.update(self.extra_scalars())
         if history:
             out["history"] = [dataclasses.asdict(record) for record in self.history]
         return plain(out)
@@ -116,7 +194,7 @@ class MapResult(CarriesPoints):
         return json.dumps(self.to_dict(history), indent=indent, allow_nan=False)
 
     def summary(self) -> str:
-        """A table of the map's figures."""
+        """A table of the scalars."""
         rows = self.to_dict()
         seconds = rows.pop("seconds")
         torus = rows.pop("torus")
@@ -149,13 +227,9 @@ class MapResult(CarriesPoints):
         OSError
             If the file cannot be written.
         """
-        from .. import io
-
         path = Path(path)
         suffix = path.suffix.lower()
         mesh, d = self.mesh, self.distortion
-        solid = hasattr(mesh, "T")
-        angles = getattr(self, "angles", None)
         if suffix == ".npz":
             self._save_npz(path)
         elif suffix in (".vtu", ".vtk", ".xdmf"):
@@ -166,19 +240,21 @@ class MapResult(CarriesPoints):
             }
             arrays |= {"image": self.image, "ring_ratio": d.ring_ratios}
             io.write(path, mesh, point_data=arrays, cell_data={"ratio": d.ratios})
-        elif suffix == ".obj" and not solid and angles is not None:
-            io.write(path, mesh, corner_uv=corner_turns(mesh.F, angles))
-        elif solid and suffix not in io.suffixes(solid=True):
-            surface = mesh.surface
-            io.write(path, type(surface)(self.image[mesh.boundary_vertices], surface.F))
+        elif isinstance(mesh, TetMesh):
+            if suffix in io.suffixes(solid=True):
+                io.write(path, TetMesh(self.image, mesh.T), cell_data={"ratio": d.ratios})
+            else:
+                io.write(path, TriMesh(self.image[mesh.boundary_vertices], mesh.surface.F))
+        elif suffix == ".obj" and self.angles is not None:
+            io.write(path, mesh, corner_uv=corner_turns(mesh.F, self.angles))
         else:
-            io.write(path, type(mesh)(self.image, elements(mesh)), cell_data={"ratio": d.ratios})
+            io.write(path, TriMesh(self.image, mesh.F), cell_data={"ratio": d.ratios})
 
     def _save_npz(self, path: Path) -> None:
         mesh = self.mesh
-        arrays = {
+        arrays: dict[str, NDArray[Any]] = {
             "V": mesh.V,
-            "T" if hasattr(mesh, "T") else "F": elements(mesh),
+            "T" if isinstance(mesh, TetMesh) else "F": elements(mesh),
             "image": self.image,
             "ratios": self.distortion.ratios,
             "ring_ratios": self.distortion.ring_ratios,
@@ -186,9 +262,9 @@ class MapResult(CarriesPoints):
         }
         if self.torus is not None:
             arrays["torus"] = np.array([self.torus.R, self.torus.r])
-        meta = json.dumps(self.to_dict(history=True), allow_nan=False)
+        arrays["meta"] = np.array(json.dumps(self.to_dict(history=True), allow_nan=False))
         with atomic_path(path) as temporary, open(temporary, "wb") as file:
-            np.savez(file, meta=np.array(meta), **arrays)
+            save_npz(file, arrays)
 
 
 def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -201,4 +277,4 @@ def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArr
 
 def elements(mesh: TriMesh | TetMesh) -> NDArray[np.int32]:
     """``T`` of a tet mesh, ``F`` of a triangle mesh."""
-    return mesh.T if hasattr(mesh, "T") else mesh.F
+    return mesh.T if isinstance(mesh, TetMesh) else mesh.F

@@ -96,7 +96,7 @@ def _remedy(mesh: Any, wanted: str, made_by: str) -> str:
         return f"a class was given where a {wanted} is needed"
     if isinstance(mesh, (str, os.PathLike)):
         return f"a path was given where a {wanted} is needed; read it, stretchmap.read(path)"
-    for attribute in ("solid", "surface"):
+    for attribute in ("mesh", "solid", "surface"):
         if isinstance(getattr(mesh, attribute, None), (TriMesh, TetMesh)):
             return f"{given}; its mesh is .{attribute}"
     return f"{given}; make one, {made_by}"

@@ -67,7 +67,7 @@ def kinds(result: MapResult) -> tuple[str, ...]:
         "domain": not torus,
         "cutaway": not solid,
         "levels": not (solid and torus),
-        "registration": getattr(result, "target", None) is None,
+        "registration": result.target is None,
         "convergence": not result.history,
     }
     return tuple(kind for kind in KINDS if not lacking.get(kind, False))

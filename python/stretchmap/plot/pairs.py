@@ -47,7 +47,7 @@ def registration(result: MapResult) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
-    solid, target = result.mesh, getattr(result, "target", None)
+    solid, target = result.mesh, result.target
     if target is None or not isinstance(solid, TetMesh):
         raise OptionError("this picture needs a registration; the map has no target solid")
     figure = empty_figure(9.6, 8.4)

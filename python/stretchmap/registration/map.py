@@ -11,9 +11,8 @@ import dataclasses
 import logging
 import os
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +25,6 @@ from ..certificate.findings import Certificate
 from ..errors import ArrayError, CertificationError, OptionError, SolverError
 from ..maps.history import IterationRecord
 from ..maps.result import MapResult
-from ..measures.elements import Distortion, distortion
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement, refine_overconstrained
 from ..volume.flip_free import FlipFreeSolver
@@ -45,13 +43,13 @@ _log = logging.getLogger("stretchmap")
 _WARM_STEPS, _WARM_C = 3, 10.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Registration(MapResult):
     """A map from one solid torus onto another.
 
     Attributes
     ----------
-    solid : TetMesh
+    mesh : TetMesh
         The source, refined if refinement was needed, on the boundary, too; the first vertices are
         those of the input.
     target : TetMesh
@@ -81,30 +79,26 @@ class Registration(MapResult):
     torus : None
     """
 
-    title = "registration"
+    _title: ClassVar[str] = "registration"
 
-    solid: TetMesh
-    target: TetMesh
-    image: NDArray[np.float64]
+    mesh: TetMesh
+    target: TetMesh = field()
+    torus: None = None
     landmarks: Landmarks
     landmark_error: float
     gauge: Gauge
     landmark_map: str
     refinement: Refinement | None = field(repr=False)
     boundary_splits: int
-    history: tuple[IterationRecord, ...] = field(repr=False)
-    distortion: Distortion
     certificate: Certificate
-    converged: bool
-    stop_reason: str
-    seconds: Mapping[str, float]
-    torus: None = None
 
     def extra_scalars(self) -> dict[str, Any]:
         """Landmarks, gauge, landmark map and what was added to the input mesh."""
         added = self.refinement
         snapped = self.landmarks.snapped
         return {
+            "certified": self.certificate.certified,
+            "certificate": self.certificate.to_dict(),
             "landmark_map": self.landmark_map,
             "landmarks": len(self.landmarks),
             "landmark_error": self.landmark_error,
@@ -326,7 +320,7 @@ def _fill(
     gap = image[marks.source] - target.V[marks.target]
     size = float(np.linalg.norm(np.ptp(target.V, axis=0)))
     return Registration(
-        solid=solid,
+        mesh=solid,
         target=target,
         image=read_only(image),
         landmarks=marks,
@@ -336,7 +330,6 @@ def _fill(
         refinement=refinement if refinement.n_split else None,
         boundary_splits=n_split,
         history=history + run.history + tuple(flip_free.history),
-        distortion=distortion(solid, image),
         certificate=certificate,
         converged=converged,
         stop_reason=stop_reason,

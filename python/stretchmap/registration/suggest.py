@@ -44,7 +44,7 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     """
     if n < 1:
         raise OptionError(f"n must be positive, got {n}")
-    solid, target = registration.solid, registration.target
+    solid, target = registration.mesh, registration.target
     first, second = solid.surface, target.surface
     image = registration.image[solid.boundary_vertices]
     rotation, scale, shift = similarity(first.V, image)

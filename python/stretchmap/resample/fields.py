@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
@@ -12,16 +10,14 @@ from ..base.arrays import as_reals
 from ..base.options import one_of
 from ..errors import DegenerateError, OptionError
 from ..maps.given import as_map_of_solid
-
-if TYPE_CHECKING:
-    from ..maps.files import LoadedMap
-    from ..registration.map import Registration
+from ..maps.result import MapResult
+from ..mesh.meshes import TetMesh
 
 __all__ = ["transfer"]
 
 
 def transfer(
-    registration: Registration | LoadedMap,
+    registration: MapResult,
     values: ArrayLike,
     *,
     conserve: str = "integral",
@@ -40,9 +36,9 @@ def transfer(
 
     Parameters
     ----------
-    registration : Registration or LoadedMap
+    registration : Registration, or LoadedMap of one
     values : array_like, shape (n,) or (k,), or (n, c) or (k, c)
-        At the vertices of ``registration.solid`` or in its tets, see ``per``. The columns of a
+        At the vertices of ``registration.mesh`` or in its tets, see ``per``. The columns of a
         vector field are carried one by one; their directions are not turned.
     conserve : {"integral", "mean"}
         What agrees, to rounding: the integral over the solid (for a density), or its mean. They
@@ -66,8 +62,8 @@ def transfer(
     DegenerateError
         If a tet of source or target has no positive volume; ``ids`` are the tets.
     """
-    _, solid = as_map_of_solid(registration, "carrying a field")
-    target = getattr(registration, "target", None)
+    registration, solid = as_map_of_solid(registration, "carrying a field")
+    target = registration.target
     if target is None:
         raise OptionError("a field is carried by a registration; this map has no target solid")
     one_of("conserve", conserve, ("integral", "mean"))
@@ -82,7 +78,7 @@ def transfer(
     # A power of two, so that no sum overflows and nothing is rounded.
     unit = np.ldexp(1.0, np.frexp(np.abs(columns).max(initial=0.0))[1] - 1)
     columns = columns / unit
-    samples = _samples(registration, columns, per)
+    samples = _samples(registration, solid, target, columns, per)
     means = np.clip(samples.mean(axis=1), samples.min(axis=1), samples.max(axis=1))
     per_tet = columns[solid.T].mean(axis=1) if per == "vertex" else columns
     wanted = solid.tet_volumes @ per_tet / solid.volume
@@ -95,10 +91,13 @@ def transfer(
 
 
 def _samples(
-    registration: Registration | LoadedMap, columns: NDArray[np.float64], per: str
+    registration: MapResult,
+    solid: TetMesh,
+    target: TetMesh,
+    columns: NDArray[np.float64],
+    per: str,
 ) -> NDArray[np.float64]:
     """(k, 4, c) The pulled-back field at the points of a rule of degree two in the target tets."""
-    solid, target = registration.solid, registration.target
     weight = (5.0 - np.sqrt(5.0)) / 20.0
     rule = np.full((4, 4), weight) + (1.0 - 4.0 * weight) * np.eye(4)
     points = np.einsum("qc,tcx->tqx", rule, target.V[target.T]).reshape(-1, 3)

@@ -6,11 +6,9 @@ import dataclasses
 import logging
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..area.map import AreaMap, area_map
@@ -21,9 +19,7 @@ from ..base.torus import Torus
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate
 from ..errors import CertificationError, DegenerateError, OptionError
-from ..maps.history import IterationRecord
 from ..maps.result import MapResult
-from ..measures.elements import Distortion, distortion
 from ..mesh.overconstrained import overconstrained_elements
 from ..mesh.refinement import Refinement, refine_overconstrained
 from .options import FlipFreeOptions
@@ -44,13 +40,13 @@ _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 _LARGE = 1_000_000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class VolumeMap(MapResult):
     """A map of a solid onto the solid torus.
 
     Attributes
     ----------
-    solid : TetMesh
+    mesh : TetMesh
         The mesh that was mapped: the input, or its refinement (see ``refinement``); the first
         vertices are those of the input.
     image : ndarray, shape (n, 3)
@@ -64,7 +60,7 @@ class VolumeMap(MapResult):
     boundary_map : AreaMap or None
         The boundary map; None if the boundary was prescribed.
     refinement : Refinement or None
-        How ``solid`` came from the input, if it was refined.
+        How ``mesh`` came from the input, if it was refined.
     history : tuple of IterationRecord
         Stages ``"vsem"``, ``"untangle"``, ``"frozen"``, ``"glide"``, ``"equalize"``, ``"exact"``,
         in that order. ``energy`` is the stretch energy in the first, the distortion energy in the
@@ -81,27 +77,24 @@ class VolumeMap(MapResult):
         Whether the ring volumes of all interior vertices were made exact.
     """
 
-    title = "volume"
+    _title: ClassVar[str] = "volume"
 
-    solid: TetMesh
-    image: NDArray[np.float64]
-    torus: Torus
+    mesh: TetMesh
+    torus: Torus = field()
     method: str
     boundary: str
     boundary_map: AreaMap | None = field(repr=False)
     refinement: Refinement | None = field(repr=False)
-    history: tuple[IterationRecord, ...] = field(repr=False)
-    distortion: Distortion
     certificate: Certificate
-    converged: bool
-    stop_reason: str
-    seconds: Mapping[str, float]
     vertex_exact: bool = False
 
     def extra_scalars(self) -> dict[str, Any]:
         """Method, boundary and what was added to the input mesh."""
         added = self.refinement
+        certificate = self.certificate
         return {
+            "certified": certificate.certified,
+            "certificate": certificate.to_dict(),
             "method": self.method,
             "boundary": self.boundary,
             "vertex_exact": self.vertex_exact,
@@ -332,15 +325,12 @@ def _result(
     scale, refinement = problem.result_scale(run.x), problem.refinement
     image, torus = run.x * scale, problem.torus.scaled(scale)
     clock = time.perf_counter()
-    figures = distortion(problem.solid, image)
     certificate = certify(problem.solid, image, torus)
     seconds = {**seconds, **run.seconds, "certificate": time.perf_counter() - clock}
     if not run.converged:
         _log.warning("volume map not converged: %s", run.stop_reason)
-    if figures.flips:
-        _log.warning("volume map has %d flipped tets", figures.flips)
-    return VolumeMap(
-        solid=problem.solid,
+    result = VolumeMap(
+        mesh=problem.solid,
         image=read_only(image),
         torus=torus,
         method=method,
@@ -348,10 +338,12 @@ def _result(
         boundary_map=boundary_map,
         refinement=refinement if refinement is not None and refinement.n_split else None,
         history=run.history,
-        distortion=figures,
         certificate=certificate,
         converged=run.converged,
         stop_reason=run.stop_reason,
         seconds=seconds,
         vertex_exact=run.vertex_exact,
     )
+    if result.distortion.flips:
+        _log.warning("volume map has %d flipped tets", result.distortion.flips)
+    return result

@@ -42,9 +42,9 @@ def run(*arguments):
 
 def test_morph_is_linear_between_source_and_image(bumpy_map):
     result = morph(bumpy_map, 5, align=False)
-    assert np.array_equal(result.frame(0), bumpy_map.solid.V)
+    assert np.array_equal(result.frame(0), bumpy_map.mesh.V)
     assert np.allclose(result.frame(4), bumpy_map.image)
-    assert np.allclose(result.frame(2), 0.5 * (bumpy_map.solid.V + bumpy_map.image))
+    assert np.allclose(result.frame(2), 0.5 * (bumpy_map.mesh.V + bumpy_map.image))
     assert result.flips[0] == result.flips[-1] == 0
 
 
@@ -70,7 +70,7 @@ def test_morph_files(bumpy_map, tmp_path):
     with pytest.raises(OptionError):
         morph(bumpy_map, 1)
     with pytest.raises(OptionError):
-        morph(sm.area_map(bumpy_map.solid.surface))
+        morph(sm.area_map(bumpy_map.mesh.surface))
 
 
 def test_morph_picture(bumpy_map, tmp_path):
@@ -133,7 +133,7 @@ def test_coordinates_command(folder, bumpy_map, capsys):
     out = folder / "coordinates.csv"
     assert run("coordinates", folder / "map.npz", "-o", out) == 0
     rows = np.loadtxt(out, delimiter=",", skiprows=1)
-    solid = bumpy_map.solid
+    solid = bumpy_map.mesh
     assert np.array_equal(rows[:, :3], solid.V) and np.array_equal(rows[:, 3:6], bumpy_map.image)
     assert np.allclose(bumpy_map.torus.xi(*rows[:, 6:].T), bumpy_map.image, atol=1e-12)
     assert out.read_text().startswith("x,y,z,image_x,image_y,image_z,u,v,s\n")
@@ -223,7 +223,7 @@ def test_a_mesh_is_no_map(folder, capsys):
 
 
 def test_commands_refuse_maps_of_surfaces(folder, bumpy_map, capsys):
-    sm.area_map(bumpy_map.solid.surface).save(folder / "surface.npz")
+    sm.area_map(bumpy_map.mesh.surface).save(folder / "surface.npz")
     for command, output in (
         ("partition", "x.npz"), ("resample", "x.vtu"), ("morph", "x.pvd"), ("coordinates", "x.csv"),
     ):  # fmt: skip

@@ -126,7 +126,7 @@ def test_a_run_goes_on_from_a_saved_map(folder):
     assert main(["volume", "solid.npz", "-o", "b.npz", "--start", "a.npz", "-q"]) == 0
     first, second = sm.load_map("a.npz"), sm.load_map("b.npz")
     assert second.distortion.element_std <= first.distortion.element_std
-    assert np.array_equal(first.solid.T, second.solid.T)
+    assert np.array_equal(first.mesh.T, second.mesh.T)
 
 
 def test_start_from_another_solids_map_is_refused(folder, capsys):
@@ -277,7 +277,7 @@ def test_keep_best_keeps_an_uncertified_map_and_still_exits_1(folder, capsys, mo
     assert code == 1
     assert "best map kept in x.npz" in capsys.readouterr().err
     assert json.loads((folder / "x.json").read_text())["certified"] is False
-    assert sm.load_map("x.npz").solid is not None
+    assert sm.load_map("x.npz").mesh.n_vertices > 0
 
 
 def test_info_lists_every_defect_and_reads_what_cannot_be_mapped(folder, capsys):

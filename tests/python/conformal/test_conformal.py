@@ -20,7 +20,7 @@ MESHES = ["bob_small", "kitten_small", "twisted_tdem", "vertebra_tdem", "knot_80
 
 def planar_corners(result):
     """(m, 3, 2) corners of each face in the plane, corner 0 at the origin."""
-    surface = result.surface
+    surface = result.mesh
     i, j = surface.edges.T
     forms = result.forms + (result.turns[j] - result.turns[i]).T
     sign = np.where(surface.F < np.roll(surface.F, -1, axis=1), 1, -1)
@@ -32,7 +32,7 @@ def planar_corners(result):
 
 def conformal_energy(result):
     """(6.1) face by face: half the Dirichlet energy, from gradients, less the signed area."""
-    x = result.surface.V[result.surface.F]
+    x = result.mesh.V[result.mesh.F]
     e1, e2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
     first = e1 / np.linalg.norm(e1, axis=1, keepdims=True)
     normal = np.cross(e1, e2)
@@ -199,7 +199,7 @@ def test_every_surface_maps_without_folds(mesh_dir, load_surface):
         result = conformal_map(load_surface(path.stem))
         assert result.flips == 0 and result.distortion.flips == 0, path.stem
         assert result.weights == "cotangent"
-        assert 0 < result.conformal_energy < 60 / result.surface.n_faces, path.stem
+        assert 0 < result.conformal_energy < 60 / result.mesh.n_faces, path.stem
         assert abs(result.gram[0, 1]) <= 0.5 * result.gram[0, 0] * (1 + 1e-9)
 
 
@@ -239,7 +239,7 @@ def test_image_lies_on_the_torus(name, load_surface):
     result = conformal_map(load_surface(name))
     _, _, s = result.torus.coordinates(result.image)
     assert np.allclose(s, result.torus.r, rtol=1e-12)
-    assert result.torus.area == pytest.approx(result.surface.area, rel=1e-12)
+    assert result.torus.area == pytest.approx(result.mesh.area, rel=1e-12)
     assert result.torus.ratio == pytest.approx(np.sqrt(1 + result.aspect**2), rel=1e-12)
     assert isinstance(result.torus, Torus)
 

@@ -49,7 +49,7 @@ def test_the_tet_found_holds_the_point():
 
 
 def test_there_and_back_on_a_certified_map(bumpy_map):
-    solid = bumpy_map.solid
+    solid = bumpy_map.mesh
     points, _ = points_inside(solid, 50_000)
     both = PointMap(bumpy_map)
     there = both.forward(points)
@@ -63,22 +63,22 @@ def test_there_and_back_on_a_certified_map(bumpy_map):
 def test_there_and_back_on_scanned_shapes(load_solid, name):
     result = sm.volume_map(load_solid(name))
     assert result.certificate.certified
-    points, _ = points_inside(result.solid, 50_000)
-    size = np.linalg.norm(np.ptp(result.solid.V, axis=0))
+    points, _ = points_inside(result.mesh, 50_000)
+    size = np.linalg.norm(np.ptp(result.mesh.V, axis=0))
     assert np.abs(result.inverse(result.forward(points)) - points).max() < 1e-9 * size
-    outside = result.solid.V.max(axis=0) + size * np.array([[0.0, 0.0, 1e-3], [1.0, 1.0, 1.0]])
+    outside = result.mesh.V.max(axis=0) + size * np.array([[0.0, 0.0, 1e-3], [1.0, 1.0, 1.0]])
     assert np.isnan(result.forward(outside)).all()
     assert not result.point_map.forward(outside).inside.any()
 
 
 def test_search_structures_do_not_hinder_copies(bumpy_map):
-    before = bumpy_map.forward(bumpy_map.solid.V[:5])
+    before = bumpy_map.forward(bumpy_map.mesh.V[:5])
     copy = pickle.loads(pickle.dumps(bumpy_map.point_map))
-    assert np.array_equal(copy.forward(bumpy_map.solid.V[:5]).points, before)
+    assert np.array_equal(copy.forward(bumpy_map.mesh.V[:5]).points, before)
 
 
 def test_vertices_and_boundary_points_belong_to_the_mesh(bumpy_map):
-    solid = bumpy_map.solid
+    solid = bumpy_map.mesh
     assert np.allclose(bumpy_map.forward(solid.V), bumpy_map.image, atol=1e-12)
     surface = solid.surface
     weights = RNG.dirichlet(np.ones(3), surface.n_faces)
@@ -136,14 +136,14 @@ def test_bad_input_is_named(bumpy_map):
     broken = bumpy_map.image.copy()
     broken[7] = np.nan
     with pytest.raises(NonFiniteError, match="image"):
-        a_map(bumpy_map.solid, broken).inverse(bumpy_map.image)
+        a_map(bumpy_map.mesh, broken).inverse(bumpy_map.image)
     with pytest.raises(ArrayError):
         bumpy_map.forward(np.zeros((3, 2)))
     with pytest.raises(NonFiniteError):
         bumpy_map.forward([[0.0, np.nan, 0.0]])
     with pytest.raises(ArrayError):
-        PointMap(sm.area_map(bumpy_map.solid.surface))
+        PointMap(sm.area_map(bumpy_map.mesh.surface))
     with pytest.raises(OptionError):
         PointMap(bumpy_map, tolerance=-1.0)
     with pytest.raises(OptionError):
-        a_map(bumpy_map.solid, bumpy_map.image).coordinates()
+        a_map(bumpy_map.mesh, bumpy_map.image).coordinates()

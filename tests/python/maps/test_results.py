@@ -3,20 +3,18 @@
 import json
 import math
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
-from stretchmap import TetMesh, Torus, TriMesh, certify, distortion, read, samples
+from stretchmap import TetMesh, Torus, certify, read, samples
 from stretchmap.certificate.findings import Certificate
 from stretchmap.errors import FileFormatError, IndexRangeError, MeshError
 from stretchmap.maps.files import load_map
 from stretchmap.maps.history import IterationRecord
 from stretchmap.maps.result import MapResult, atomic_path, table
-from stretchmap.measures.elements import Distortion
 
 REQUIRED = set(
     """
@@ -31,47 +29,22 @@ HISTORY = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SolidMap(MapResult):
-    title = "volume map"
+    _title = "volume map"
 
-    solid: TetMesh
-    image: np.ndarray
-    torus: Torus | None
-    history: tuple[IterationRecord, ...]
-    distortion: Distortion
     certificate: Certificate
-    converged: bool
-    stop_reason: str
-    seconds: Mapping[str, float]
 
     def extra_arrays(self) -> dict[str, Any]:
-        return {"height": self.solid.V[:, 2]}
+        return {"height": self.mesh.V[:, 2]}
 
     def extra_scalars(self) -> dict[str, Any]:
-        return {"c": np.float64(10.0)}
+        return {"c": np.float64(10.0), "certified": self.certificate.certified}
 
 
-@dataclass(frozen=True, eq=False)
 class SurfaceMap(MapResult):
-    surface: TriMesh
-    image: np.ndarray
-    angles: np.ndarray
-    torus: Torus
-    history: tuple[IterationRecord, ...] = ()
-    converged: bool = True
-    stop_reason: str = "tolerance"
-    seconds: Mapping[str, float] = None
-
-    def __post_init__(self):
-        object.__setattr__(self, "seconds", {"area": 0.5})
-
     def extra_arrays(self):
         return {"angles": self.angles}
-
-    @property
-    def distortion(self):
-        return distortion(self.surface, self.image, torus=self.torus)
 
 
 @pytest.fixture(scope="module")
@@ -79,9 +52,15 @@ def solid_map():
     solid = samples.solid_torus(1_500)
     image = solid.V * [1.0, 1.0, 0.999]
     return SolidMap(
-        solid, image, TORUS, HISTORY, distortion(solid, image),
-        certify(solid, image, TORUS, tolerance=0.1), False, "step limit", {"volume": 1.5},
-    )  # fmt: skip
+        mesh=solid,
+        image=image,
+        torus=TORUS,
+        history=HISTORY,
+        certificate=certify(solid, image, TORUS, tolerance=0.1),
+        converged=False,
+        stop_reason="step limit",
+        seconds={"volume": 1.5},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -89,13 +68,21 @@ def surface_map():
     surface = samples.torus_surface(20, 10)
     u, v, _ = TORUS.coordinates(surface.V)
     angles = np.stack([u - 1.0, v + 2.0], axis=1)
-    return SurfaceMap(surface, TORUS.xi(*angles.T), angles, TORUS)
+    return SurfaceMap(
+        mesh=surface,
+        image=TORUS.xi(*angles.T),
+        torus=TORUS,
+        angles=angles,
+        converged=True,
+        stop_reason="tolerance",
+        seconds={"area": 0.5},
+    )
 
 
 def test_report_holds_what_it_must(solid_map):
     report = json.loads(solid_map.to_json())
     assert report.keys() >= REQUIRED
-    assert report["n_elements"] == len(solid_map.solid.T)
+    assert report["n_elements"] == len(solid_map.mesh.T)
     assert report["flips"] == 0 and report["certified"] is True
     assert report["torus"] == {"R": 3.0, "r": 1.0}
     assert report["iterations"] == 1
@@ -124,9 +111,9 @@ def test_map_file_comes_back(solid_map, tmp_path):
     with np.load(path) as file:
         assert {"V", "T", "image", "ratios", "meta", "height", "torus"} <= set(file.files)
     back = load_map(path)
-    np.testing.assert_array_equal(back.solid.T, solid_map.solid.T)
+    np.testing.assert_array_equal(back.mesh.T, solid_map.mesh.T)
     np.testing.assert_array_equal(back.image, solid_map.image)
-    np.testing.assert_array_equal(back.arrays["height"], solid_map.solid.V[:, 2])
+    np.testing.assert_array_equal(back.arrays["height"], solid_map.mesh.V[:, 2])
     assert back.torus == TORUS and back.title == "volume map"
     assert (back.converged, back.stop_reason) == (False, "step limit")
     assert back.history[1] == HISTORY[1]
@@ -165,26 +152,26 @@ def test_solid_as_unstructured_grid(solid_map, tmp_path, suffix):
     grid = meshio.read(path)
     np.testing.assert_allclose(grid.point_data["image"], solid_map.image)
     np.testing.assert_allclose(grid.cell_data["ratio"][0], solid_map.distortion.ratios)
-    np.testing.assert_allclose(grid.points, solid_map.solid.V)
+    np.testing.assert_allclose(grid.points, solid_map.mesh.V)
 
 
 def test_solid_in_a_surface_format_is_the_boundary_of_the_image(solid_map, tmp_path):
     path = tmp_path / "map.ply"
     solid_map.save(path)
     surface = read(path)
-    assert len(surface.F) == len(solid_map.solid.surface.F)
+    assert len(surface.F) == len(solid_map.mesh.surface.F)
     assert surface.volume == pytest.approx(solid_map.distortion.image_total, rel=1e-5)
 
 
 def test_surface_as_obj_keeps_the_source_and_its_chart(surface_map, tmp_path):
     path = tmp_path / "map.obj"
     surface_map.save(path)
-    np.testing.assert_allclose(read(path).V, surface_map.surface.V, rtol=1e-12)
+    np.testing.assert_allclose(read(path).V, surface_map.mesh.V, rtol=1e-12)
     uv = np.array(
         [line.split()[1:3] for line in path.read_text().splitlines() if line.startswith("vt ")],
         float,
     )
-    assert uv.min() > -1 and uv.max() < 2 and len(uv) > len(surface_map.surface.V)
+    assert uv.min() > -1 and uv.max() < 2 and len(uv) > len(surface_map.mesh.V)
 
 
 def test_surface_as_ply_is_its_image(surface_map, tmp_path):

@@ -52,7 +52,7 @@ def test_fifths_are_exact(bumpy_map, by):
     check(bumpy_map, raw)
     assert np.allclose(raw.errors, parts.uncorrected_errors, atol=1e-12)
     assert 0.0 < np.abs(raw.errors).max() < 0.05
-    expected = np.cumsum(raw.volumes)[:-1] / (np.arange(1, 5) / 5 * bumpy_map.solid.volume) - 1
+    expected = np.cumsum(raw.volumes)[:-1] / (np.arange(1, 5) / 5 * bumpy_map.mesh.volume) - 1
     assert np.allclose(parts.cumulative_errors, expected, atol=1e-12)
 
 
@@ -61,7 +61,7 @@ def test_unequal_shares_and_another_start(bumpy_map, by):
     shares = [0.55, 0.05, 0.3, 0.1]
     parts = partition(bumpy_map, shares, by, start=1.0)
     check(bumpy_map, parts)
-    assert np.allclose(parts.volumes / bumpy_map.solid.volume, shares, rtol=1e-12)
+    assert np.allclose(parts.volumes / bumpy_map.mesh.volume, shares, rtol=1e-12)
 
 
 @pytest.mark.parametrize("by", ["u", "v"])
@@ -181,8 +181,8 @@ def test_bad_options_are_named(bumpy_map, options):
 
 def test_maps_without_torus_or_of_surfaces_are_refused(bumpy_map):
     with pytest.raises(OptionError):
-        partition(a_map(bumpy_map.solid, bumpy_map.image))
+        partition(a_map(bumpy_map.mesh, bumpy_map.image))
     with pytest.raises(ArrayError):
-        partition(sm.area_map(bumpy_map.solid.surface))
+        partition(sm.area_map(bumpy_map.mesh.surface))
     with pytest.raises(OptionError):
         partition(bumpy_map, 2).part(2)

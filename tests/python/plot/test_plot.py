@@ -110,10 +110,10 @@ def test_histograms_hold_every_element_and_name_both_maps(volume):
 def test_ratios_before_are_those_of_the_harmonic_map(volume):
     before, name = ratios_before(volume)
     frozen = sm.volume_map(
-        volume.solid, c=0.0, max_iter=0, start=volume.image, torus=volume.torus
+        volume.mesh, c=0.0, max_iter=0, start=volume.image, torus=volume.torus
     ).distortion
     assert name == "harmonic map"
-    assert np.average(before, weights=volume.solid.tet_volumes) == pytest.approx(1.0)
+    assert np.average(before, weights=volume.mesh.tet_volumes) == pytest.approx(1.0)
     # With no step at all the map is what we gave, not the harmonic one, which preserves less.
     assert frozen.element_std < before.std()
 
@@ -192,7 +192,7 @@ def test_a_sector_is_cut_out_by_planes(standard):
     turn = (np.arctan2(y, x) - front) / (2.0 * np.pi)
     assert np.abs(turn - np.round(turn)).min() > 0.5 * opening - 1e-9
     left = sm.TetMesh(pieces.image, pieces.T[kept])
-    assert left.volume / standard.solid.volume == pytest.approx(1.0 - opening, abs=5e-3)
+    assert left.volume / standard.mesh.volume == pytest.approx(1.0 - opening, abs=5e-3)
     faces, tets = pieces.faces(kept)
     assert kept[tets].all() and len(faces) == left.surface.n_faces
     assert np.array_equal(pieces.source, pieces.image)
@@ -233,7 +233,7 @@ def test_landmarks_have_numbers_and_rings_where_they_are_carried(registered):
     assert len(either) > 25
     dots, rings = (c.get_offsets() for c in figure.axes[1].collections[1:3])
     assert np.allclose(dots, rings, atol=1e-6)
-    assert len(plot.registration(sm.register(registered.solid, registered.target)).axes) == 4
+    assert len(plot.registration(sm.register(registered.mesh, registered.target)).axes) == 4
 
 
 def test_numbers_keep_clear_of_dots_and_of_each_other():

@@ -96,10 +96,10 @@ def test_the_boundary_goes_to_the_boundary(pair, registered):
 
 def test_there_and_back(registered):
     both = PointMap(registered)
-    points = registered.solid.V[registered.solid.T].mean(axis=1)
+    points = registered.mesh.V[registered.mesh.T].mean(axis=1)
     there = both.forward(points)
     assert there.inside.all()
-    assert np.abs(both.inverse(there.points).points - points).max() < 1e-9 * size(registered.solid)
+    assert np.abs(both.inverse(there.points).points - points).max() < 1e-9 * size(registered.mesh)
 
 
 def test_landmarks_as_points_and_files(pair, tmp_path):

@@ -44,7 +44,7 @@ def test_the_grid_of_the_standard_torus_is_the_standard_grid(standard):
     assert np.allclose(mesh.V, mesh.grid, atol=1e-9)
     assert mesh.n_negative == 0 and mesh.n_pulled_back_negative == 0
     assert len(mesh.H) == 48 * (4 * 4 + 4 * 4 * 4)
-    assert mesh.volume == pytest.approx(standard.solid.volume, rel=0.04)
+    assert mesh.volume == pytest.approx(standard.mesh.volume, rel=0.04)
     # Every inner quad is shared by two hexahedra, the rest is a torus.
     faces = mesh.H[:, [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6],
                        [3, 0, 4, 7]]].reshape(-1, 4)  # fmt: skip
@@ -59,7 +59,7 @@ def test_the_grid_of_the_standard_torus_is_the_standard_grid(standard):
 def test_a_mapped_grid_has_positive_jacobians_and_fills_the_solid(bumpy_map):
     mesh = hex_mesh(bumpy_map, sections=40)
     assert mesh.n_negative == 0 and mesh.jacobians.max() <= 1.0 + 1e-12
-    assert mesh.volume == pytest.approx(bumpy_map.solid.volume, rel=0.1)
+    assert mesh.volume == pytest.approx(bumpy_map.mesh.volume, rel=0.1)
     u, v, s = mesh.coordinates.T
     assert np.allclose(bumpy_map.torus.xi(u, v, s), mesh.grid, atol=1e-12)
 

@@ -244,7 +244,7 @@ def test_going_on_from_a_saved_map_lowers_the_distortion_further(bumpy, tmp_path
     first = sm.volume_map(bumpy, max_iter=12)
     first.save(tmp_path / "map.npz")
     loaded = load_map(tmp_path / "map.npz")
-    again = sm.volume_map(loaded.solid, start=loaded.image, torus=loaded.torus)
+    again = sm.volume_map(loaded.mesh, start=loaded.image, torus=loaded.torus)
     assert again.certificate.certified
     assert again.distortion.element_error_mean < first.distortion.element_error_mean
     assert {record.stage for record in again.history} == {"glide", "equalize"}
@@ -280,7 +280,7 @@ def test_refinement_is_reported_or_refused(load_solid):
     result = sm.volume_map(solid, max_iter=3)
     assert result.certificate.certified
     assert result.refinement is not None and result.refinement.n_split > 0
-    assert np.array_equal(result.solid.V[: solid.n_vertices], solid.V)
+    assert np.array_equal(result.mesh.V[: solid.n_vertices], solid.V)
     assert result.to_dict()["added_vertices"] == result.refinement.n_split
 
 
