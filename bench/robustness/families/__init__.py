@@ -13,7 +13,7 @@ from stretchmap import TetMesh, TriMesh
 from stretchmap.errors import StretchmapError
 
 _ATTEMPTS = 40
-_FEWEST, _MOST = 6_000, 30_000
+_FEWEST, _MOST = 5_000, 60_000
 
 
 @dataclass(frozen=True)

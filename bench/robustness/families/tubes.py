@@ -14,18 +14,18 @@ from . import Family
 def shape(rng: np.random.Generator) -> tuple[list[RoundCone], float]:
     """A loop whose radius varies, branches that end in blobs; and its mean radius."""
     loop = fourier_loop(rng, int(rng.integers(1, 5)), rng.uniform(0.0, 0.35), 150)
-    mean = rng.uniform(0.18, 0.34)
+    mean = rng.uniform(0.12, 0.26)
     t = np.linspace(0.0, 2.0 * np.pi, len(loop), endpoint=False)
-    waves = rng.normal(size=3) * 0.18
+    waves = rng.normal(size=3) * 0.2
     radii = mean * np.exp(sum(w * np.cos((k + 1) * t + k) for k, w in enumerate(waves)))
     parts = tube(loop, radii)
-    for _ in range(rng.integers(0, 7)):
+    for _ in range(rng.integers(1, 11)):
         at = int(rng.integers(len(loop)))
         point, way = loop[at], rng.normal(size=3)
-        thickness = float(radii[at]) * rng.uniform(0.35, 0.8)
+        thickness = float(radii[at]) * rng.uniform(0.3, 0.9)
         for _ in range(rng.integers(1, 4)):
             way = way / np.linalg.norm(way) + 0.4 * rng.normal(size=3)
-            end = point + way * rng.uniform(0.12, 0.4)
+            end = point + way * rng.uniform(0.15, 0.55)
             thinner = thickness * rng.uniform(0.6, 1.0)
             parts.append(RoundCone(point, end, thickness, thinner))
             point, thickness = end, thinner
