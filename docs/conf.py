@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import stretchmap
+
+sys.path.insert(0, str(Path(__file__).parent))  # gallery_figures
 
 project = "stretchmap"
 author = "The stretchmap developers"
@@ -19,7 +24,7 @@ extensions = [
 html_theme = "pydata_sphinx_theme"
 html_title = f"stretchmap {release}"
 html_theme_options = {"navigation_with_keys": False, "show_prev_next": False}
-exclude_patterns = ["results.md", "release.md"]
+exclude_patterns = ["results.md", "robustness.md", "release.md", "gallery/*.ipynb", "gallery/*.py"]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 
@@ -28,11 +33,13 @@ numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
 sphinx_gallery_conf = {
+    "image_scrapers": ("gallery_figures",),
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
-    "matplotlib_animations": False,
     "abort_on_example_error": True,
     "show_memory": False,
     "reset_modules": (),
+    "within_subsection_order": "FileNameSortKey",
+    "copyfile_regex": r".*HEADER\.md",
 }

@@ -11,14 +11,18 @@ import pytest
 
 _ROOT = Path(__file__).resolve().parents[3]
 _OUTPUT = {
-    "register_vertebrae": "registration.npz",
-    "partition_into_fifths": "parts.vtu",
-    "coordinates_and_grid": "grid.vtu",
-    "morph_and_transfer": "morph.pvd",
+    "01_map_a_solid": "map.npz",
+    "02_partition_into_fifths": "parts.vtu",
+    "03_coordinates_and_grid": "grid.vtu",
+    "04_register_vertebrae": "registration.npz",
+    "05_morph_and_transfer": "morph.pvd",
+    "06_compare_methods": "comparison.png",
 }
 
 
-@pytest.mark.parametrize("path", sorted((_ROOT / "examples").glob("*.py")), ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path", sorted((_ROOT / "examples").glob("[0-9]*.py")), ids=lambda p: p.stem
+)
 def test_example(path, tmp_path):
     output = _OUTPUT.get(path.stem)
     run = subprocess.run(

@@ -1,6 +1,10 @@
-"""Carry a field from one solid to another with its integral, and morph one into the other.
+"""
+5 - Fields and morphs
+=====================
 
-Run: python examples/morph_and_transfer.py [morph.pvd | morph.gif]
+Carry a field from one solid to another with its integral, and morph one into the other.
+
+Run: python examples/05_morph_and_transfer.py [morph.pvd | morph.gif]
 """
 
 import sys
@@ -21,6 +25,8 @@ carried = transfer(result, density)
 print(f"integral {integral:.6f} before, {(pair.target.tet_volumes * carried).sum():.6f} after")
 assert np.isclose((pair.target.tet_volumes * carried).sum(), integral, rtol=1e-12)
 
+# %%
+# Frames on the way, none with a tet turned over.
 frames = morph(result, frames=7)
 print(frames.summary())
 if len(sys.argv) > 1:

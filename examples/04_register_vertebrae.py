@@ -1,6 +1,10 @@
-"""Register two synthetic vertebrae by 30 landmarks and compare with the true correspondence.
+"""
+4 - One bone onto another
+=========================
 
-Run: python examples/register_vertebrae.py [registration.npz]
+Register two synthetic vertebrae by 30 landmarks and compare with the true correspondence.
+
+Run: python examples/04_register_vertebrae.py [registration.npz]
 """
 
 import sys
@@ -8,6 +12,7 @@ import sys
 import numpy as np
 
 import stretchmap as sm
+from stretchmap import plot
 from stretchmap.samples import vertebra_pair
 
 pair = vertebra_pair(n_landmarks=30, n_tets=(12_000, 15_000))
@@ -26,6 +31,10 @@ def errors(result):
 free = sm.register(pair.source, pair.target)
 guided = sm.register(pair.source, pair.target, (pair.source_landmarks, pair.target_landmarks))
 print(guided.summary())
+same_colors = plot.registration(guided)
+
+# %%
+# Both against the truth.
 
 print("\ndistance from the true correspondence, in per cent of the target's size")
 print(f"(an edge of its mesh is {100 * edge:.1f} % on average)")

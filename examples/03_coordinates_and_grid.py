@@ -1,6 +1,10 @@
-"""Solid-torus coordinates at any point, the way back, and a structured hexahedral mesh.
+"""
+3 - Coordinates and hexahedra
+=============================
 
-Run: python examples/coordinates_and_grid.py [grid.vtu]
+Solid-torus coordinates at any point, the way back, and a structured hexahedral mesh.
+
+Run: python examples/03_coordinates_and_grid.py [grid.vtu]
 """
 
 import sys
@@ -8,6 +12,7 @@ import sys
 import numpy as np
 
 import stretchmap as sm
+from stretchmap import plot
 from stretchmap.resample.hexes import hex_mesh
 from stretchmap.samples import vertebra_like
 
@@ -25,6 +30,12 @@ print(f"there and back: {np.abs(back - points).max() / size:.1e} of the size")
 assert np.abs(back - points).max() < 1e-9 * size
 assert np.isnan(result.forward([[1e3, 0.0, 0.0]])).all()  # outside: told, not guessed
 
+# %%
+# The angle round the tube, on the boundary and inside.
+angle = plot.cutaway(result)
+
+# %%
+# A grid of the solid torus pulled back.
 grid = hex_mesh(result, sections=48)
 print(grid.summary())
 assert grid.n_negative == 0
