@@ -7,7 +7,7 @@ from pathlib import Path
 
 import stretchmap
 
-sys.path.insert(0, str(Path(__file__).parent))  # gallery_figures
+sys.path.insert(0, str(Path(__file__).parent))  # gallery_figures, mathml
 
 project = "stretchmap"
 author = "The stretchmap developers"
@@ -18,9 +18,10 @@ extensions = [
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
+    "mathml",
     "sphinx_gallery.gen_gallery",
 ]
+html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_title = f"stretchmap {release}"
 html_theme_options = {"navigation_with_keys": False, "show_prev_next": False}
@@ -41,5 +42,5 @@ sphinx_gallery_conf = {
     "show_memory": False,
     "reset_modules": (),
     "within_subsection_order": "FileNameSortKey",
-    "copyfile_regex": r".*HEADER\.md",
+    "copyfile_regex": r".*HEADER\.rst",
 }
