@@ -32,7 +32,7 @@ __all__ = ["AreaMap", "area_map"]
 _log = logging.getLogger("stretchmap")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class AreaMap(MapResult):
     """An area-preserving map onto a torus of revolution.
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import platform
+import re
 from collections.abc import Mapping
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -56,3 +58,30 @@ def cell(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"({', '.join(cell(entry) for entry in value)})"
     return format(value, ".6g") if isinstance(value, float) else str(value)
+
+
+class HasSummary:
+    """What notebooks show as a table: anything with a ``summary()`` of names and values."""
+
+    def summary(self) -> str:
+        """A table of names and values."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        return html(self.summary())
+
+
+def html(text: str) -> str:
+    """A table of `table` as HTML: one row per line, cells parted by two spaces or more.
+
+    Examples
+    --------
+    >>> html(table({"n_tets": 6}))
+    '<table><tbody><tr><th>n tets</th><td>6</td></tr></tbody></table>'
+    """
+    rows = []
+    for line in text.splitlines():
+        name, *values = re.split(r"\s{2,}", line.rstrip())
+        cells = "".join(f"<td>{escape(value)}</td>" for value in values)
+        rows.append(f"<tr><th>{escape(name)}</th>{cells}</tr>")
+    return f"<table><tbody>{''.join(rows)}</tbody></table>"

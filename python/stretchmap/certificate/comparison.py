@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ..base.tables import cell, plain
+from ..base.tables import HasSummary, cell, plain
 from ..base.torus import Torus
 from ..errors import OptionError
 from ..maps.result import MapResult
@@ -33,7 +33,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(HasSummary):
     """Maps of one mesh side by side.
 
     Attributes

@@ -25,7 +25,7 @@ from .torus import conformal_torus, tube_angle
 __all__ = ["ConformalMap", "conformal_map"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ConformalMap(MapResult):
     """A discrete conformal map to a flat torus, and from there to a torus of revolution.
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..base.arrays import as_integers, read_only
 from ..base.files import atomic_path
-from ..base.tables import table
+from ..base.tables import HasSummary, table
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms, solve_harmonic
 from ..io.npz import save_npz
@@ -38,7 +38,7 @@ logger = logging.getLogger("stretchmap")
 
 
 @dataclass(frozen=True, eq=False)
-class HomologyBasis:
+class HomologyBasis(HasSummary):
     """Generators of the first homology of a closed surface and what the embedding says of them.
 
     A loop is an array of vertex ids, the first not repeated at the end. A class is an integer row

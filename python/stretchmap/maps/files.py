@@ -22,7 +22,7 @@ from .result import MapResult
 __all__ = ["LoadedMap", "load_map"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class LoadedMap(MapResult):
     """A map read back from a file, whoever wrote it.
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..base.arrays import as_reals, read_only
 from ..base.options import instance
-from ..base.tables import plain, table
+from ..base.tables import HasSummary, plain, table
 from ..base.torus import Torus
 from ..errors import DegenerateError, OptionError, OrientationError
 from ..mesh.given import as_mesh
@@ -27,7 +27,7 @@ __all__ = ["Distortion", "distortion"]
 
 
 @dataclass(frozen=True, eq=False)
-class Distortion:
+class Distortion(HasSummary):
     """How far a piecewise-affine map is from preserving area or volume.
 
     Sizes are areas for a surface and volumes for a solid, normalised by their totals, so that a

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
-from ..base.tables import plain, table
+from ..base.tables import HasSummary, plain, table
 from ..errors import ArrayError, OptionError
 from ..mesh.meshes import TetMesh, TriMesh
 from .cutting import Pieces, cut_all, part_volumes
@@ -42,7 +42,7 @@ __all__ = ["Partition", "partition"]
 
 
 @dataclass(frozen=True, eq=False)
-class Partition:
+class Partition(HasSummary):
     """A solid cut into parts.
 
     Attributes

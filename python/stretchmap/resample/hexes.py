@@ -22,7 +22,7 @@ from ..base.arrays import read_only
 from ..base.files import atomic_path
 from ..base.options import flag, memory, whole
 from ..base.progress import Progress
-from ..base.tables import plain, table
+from ..base.tables import HasSummary, plain, table
 from ..base.torus import TWO_PI, Torus
 from ..errors import FileFormatError, MissingDependencyError, SolverError
 from ..maps.given import as_map_of_solid, torus_of
@@ -44,7 +44,7 @@ _LEAST = 0.05  # least scaled Jacobian of a grid that is not repaired
 
 
 @dataclass(frozen=True, eq=False)
-class HexMesh:
+class HexMesh(HasSummary):
     """A structured hexahedral mesh of a solid.
 
     Attributes
