@@ -29,7 +29,7 @@ def versions() -> dict[str, str]:
 def plain(value: Any) -> Any:
     """A copy made of what JSON knows: NumPy scalars and arrays converted, non-finite to None."""
     if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
+        return plain_dict(value)
     if isinstance(value, (list, tuple)):
         return [plain(v) for v in value]
     if isinstance(value, np.ndarray):
@@ -39,6 +39,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def plain_dict(rows: Mapping[Any, Any]) -> dict[str, Any]:
+    """`plain` of every entry, by the name of its key."""
+    return {str(name): plain(value) for name, value in rows.items()}
 
 
 def table(rows: Mapping[str, Any]) -> str:

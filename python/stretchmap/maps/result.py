@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import io
 from ..base.arrays import read_only
 from ..base.files import atomic_path
-from ..base.tables import HasSummary, plain, table, versions
+from ..base.tables import HasSummary, plain_dict, table, versions
 from ..base.torus import TWO_PI, Torus
 from ..errors import OptionError
 from ..io.npz import save_npz
@@ -220,7 +220,7 @@ class MapResult(HasSummary):
         }
         if history:
             out["history"] = [dataclasses.asdict(record) for record in self.history]
-        return plain(out)
+        return plain_dict(out)
 
     def to_json(self, history: bool = False, indent: int | None = 2) -> str:
         """:meth:`to_dict` as JSON text; what is not finite becomes ``null``."""

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..base.arrays import as_reals, read_only
 from ..base.options import instance
-from ..base.tables import HasSummary, plain, table
+from ..base.tables import HasSummary, plain_dict, table
 from ..base.torus import Torus
 from ..errors import DegenerateError, OptionError, OrientationError
 from ..mesh.given import as_mesh
@@ -98,7 +98,7 @@ class Distortion(HasSummary):
     def to_dict(self) -> dict[str, float | int | None]:
         """The scalars, JSON-compatible."""
         arrays = ("ratios", "ring_ratios", "angles", "flipped")
-        return plain({k: v for k, v in self.__dict__.items() if k not in arrays})
+        return plain_dict({k: v for k, v in self.__dict__.items() if k not in arrays})
 
     def summary(self) -> str:
         """A table of the scalars."""

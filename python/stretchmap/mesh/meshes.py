@@ -377,7 +377,7 @@ class TetMesh(_Mesh):
 
 def _compacted(elements: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     kept, inverse = np.unique(elements, return_inverse=True)
-    return read_only(kept), inverse.reshape(elements.shape)
+    return read_only(kept), inverse.reshape(elements.shape).astype(np.int32)
 
 
 def _turned(elements: NDArray[np.int32], ids: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .. import _core, io
 from ..base.arrays import read_only
 from ..base.files import atomic_path
-from ..base.tables import HasSummary, plain, table
+from ..base.tables import HasSummary, plain_dict, table
 from ..errors import FileFormatError, OptionError
 from ..mesh.meshes import TetMesh
 
@@ -54,7 +54,7 @@ class Morph(HasSummary):
 
     def to_dict(self) -> dict[str, Any]:
         """The figures, JSON-compatible."""
-        return plain({"frames": len(self.times), "most_flips": int(self.flips.max())})
+        return plain_dict({"frames": len(self.times), "most_flips": int(self.flips.max())})
 
     def summary(self) -> str:
         """A table of the figures."""

@@ -22,7 +22,7 @@ from ..base.arrays import read_only
 from ..base.files import atomic_path
 from ..base.options import flag, memory, whole
 from ..base.progress import Progress
-from ..base.tables import HasSummary, plain, table
+from ..base.tables import HasSummary, plain_dict, table
 from ..base.torus import TWO_PI, Torus
 from ..errors import FileFormatError, MissingDependencyError, SolverError
 from ..maps.given import as_map_of_solid, torus_of
@@ -94,7 +94,7 @@ class HexMesh(HasSummary):
 
     def to_dict(self) -> dict[str, Any]:
         """The figures, JSON-compatible."""
-        return plain(
+        return plain_dict(
             {
                 "n_points": len(self.V),
                 "n_hexahedra": len(self.H),
