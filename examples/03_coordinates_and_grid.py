@@ -38,6 +38,6 @@ angle = plot.cutaway(result)
 # A grid of the solid torus pulled back.
 grid = hex_mesh(result, sections=48)
 print(grid.summary())
-assert grid.n_negative == 0
+assert grid.n_invalid == 0
 if len(sys.argv) > 1:
     grid.save(sys.argv[1])

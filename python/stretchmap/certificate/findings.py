@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.tables import HasSummary, plain_dict, table
+from ..base.tables import plain, table
 
 MOST_IDS = 1000
 
@@ -17,7 +17,7 @@ __all__ = ["Certificate"]
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate(HasSummary):
+class Certificate:
     """Outcome of :func:`certify`.
 
     Attributes
@@ -51,7 +51,7 @@ class Certificate(HasSummary):
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, JSON-compatible."""
-        return plain_dict(self.__dict__)
+        return plain(self.__dict__)
 
     def summary(self) -> str:
         """A table of the checks and quantities."""

@@ -185,18 +185,19 @@ def resample(
     sections: Annotated[int, typer.Option(help="Hexahedra round the axis.")] = 64,
     block: Annotated[int, typer.Option(help="Hexahedra along a side of the middle block.")] = 4,
     rings: Annotated[int, typer.Option(help="Layers between block and boundary.")] = 4,
-    repair: Annotated[bool, typer.Option(help="Make all corner Jacobians positive.")] = True,
+    repair: Annotated[bool, typer.Option(help="Make all hexahedra valid.")] = True,
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
     """Mesh a mapped solid with hexahedra.
 
-    The mesh is structured; exit code 1 if a corner Jacobian is not positive.
+    The mesh is structured; exit code 1 if a hexahedron is not proven to be valid.
     """
     from ..base.progress import terminal
+    from ..resample.hex_files import HEX_SUFFIXES
     from ..resample.hexes import hex_mesh
 
-    common.check_outputs(output, (".vtu", ".vtk"), json, map_file)
+    common.check_outputs(output, HEX_SUFFIXES, json, map_file)
     result = _solid_map(map_file, "resample")
     with terminal(quiet) as bar:
         mesh = hex_mesh(
@@ -206,8 +207,8 @@ def resample(
     if not quiet:
         typer.echo(mesh.summary())
         typer.echo(f"written to {output}")
-    if mesh.n_negative:
-        _log.error("%d hexahedra have a corner that is not positive", mesh.n_negative)
+    if mesh.n_invalid:
+        _log.error("%d hexahedra are not valid", mesh.n_invalid)
         return 1
     return 0
 

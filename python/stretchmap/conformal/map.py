@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
-from ..base.progress import Progress, report
-from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..errors import OptionError
-from ..forms.harmonic import WEIGHTS, HarmonicForms, Weights
+from ..forms.harmonic import WEIGHTS, HarmonicForms
 from ..homology.basis import HomologyBasis, homology_basis
 from ..homology.representatives import harmonic_forms
 from ..maps.result import MapResult
@@ -27,7 +25,7 @@ from .torus import conformal_torus, tube_angle
 __all__ = ["ConformalMap", "conformal_map"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ConformalMap(MapResult):
     """A discrete conformal map to a flat torus, and from there to a torus of revolution.
 
@@ -78,7 +76,7 @@ class ConformalMap(MapResult):
     aspect: float
     skew: float
     conformal_energy: float
-    weights: Weights
+    weights: str
     chart_areas: NDArray[np.float64] = field(repr=False)
     torus: Torus = field()
     angles: NDArray[np.float64] = field(repr=False)
@@ -108,14 +106,8 @@ class ConformalMap(MapResult):
         }
 
 
-@takes_threads
 def conformal_map(
-    surface: TriMesh,
-    *,
-    basis: HomologyBasis | None = None,
-    weights: Literal["auto"] | Weights = "auto",
-    threads: int | None = None,
-    progress: Progress | None = None,
+    surface: TriMesh, basis: HomologyBasis | None = None, *, weights: str = "auto"
 ) -> ConformalMap:
     """Map a genus-one surface conformally onto a flat torus and a torus of revolution.
 
@@ -128,10 +120,6 @@ def conformal_map(
     weights : {"auto", "cotangent", "intrinsic_delaunay", "clamped"}
         Weights of the harmonic forms, see `HarmonicForms`. ``"auto"`` takes the first of the three
         whose chart has no fold; the last cannot fold but for rounding, the result says which it is.
-    threads : int, optional
-        Threads to use, see `threads`; the result does not depend on it.
-    progress : Progress, optional
-        Called once per choice of weights tried.
 
     Returns
     -------
@@ -155,8 +143,7 @@ def conformal_map(
         basis = homology_basis(surface)
     basis.require_torus()
     middle = perf_counter()
-    choices = WEIGHTS if weights == "auto" else (weights,)
-    harmonic, forms, areas = _chart(surface, basis, choices, progress)
+    harmonic, forms, areas = _chart(surface, basis, WEIGHTS if weights == "auto" else (weights,))
     cotangent = _core.forms.cotangent_weights(surface.topology, surface.V)
     gram = (forms * cotangent) @ forms.T
     aspect = math.sqrt(gram[1, 1] / gram[0, 0])
@@ -187,22 +174,17 @@ def conformal_map(
 
 
 def _chart(
-    surface: TriMesh,
-    basis: HomologyBasis,
-    choices: tuple[Weights, ...],
-    progress: Progress | None,
+    surface: TriMesh, basis: HomologyBasis, choices: tuple[str, ...]
 ) -> tuple[HarmonicForms, NDArray[np.float64], NDArray[np.float64]]:
     """First of the weights without a fold, else the one with fewest: forms (2, e), areas (m,)."""
-    fewest, best = math.inf, None
-    for done, weights in enumerate(choices, 1):
+    best = None
+    for weights in choices:
         harmonic = harmonic_forms(surface, basis, weights=weights)
         forms = basis.torus_matrix @ harmonic.forms
         areas = _core.forms.chart_areas(surface.topology, forms[0], forms[1])
         folds = int((areas <= 0.0).sum())
-        report(progress, "conformal", done, len(choices), folds=folds)
-        if best is None or folds < fewest:
-            fewest, best = folds, (harmonic, forms, areas)
+        if best is None or folds < best[0]:
+            best = (folds, harmonic, forms, areas)
         if folds == 0:
             break
-    assert best is not None, "there is a choice of weights"
-    return best
+    return best[1:]

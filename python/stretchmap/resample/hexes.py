@@ -8,10 +8,7 @@ the piecewise-affine map leaves hexahedra turned over or nearly so, the grid is 
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +16,15 @@ from scipy.spatial import cKDTree
 
 from .. import _core
 from ..base.arrays import read_only
-from ..base.files import atomic_path
 from ..base.options import flag, memory, whole
 from ..base.progress import Progress
-from ..base.tables import HasSummary, plain_dict, table
 from ..base.torus import TWO_PI, Torus
-from ..errors import FileFormatError, MissingDependencyError, SolverError
+from ..errors import SolverError
 from ..maps.given import as_map_of_solid, torus_of
 from ..registration.flat_torus import FlatSurface
-from .o_grid import o_grid
-from .quality import corner_tets, hex_volumes, jacobians
+from .hex_result import HexMesh
+from .layout import Layout, swept_layout
+from .quality import boundary_distances, boundary_quads
 from .repair import GridRepair
 
 if TYPE_CHECKING:
@@ -41,112 +37,6 @@ _BISECTIONS = 40
 _MOST = 100_000  # hexahedra in any direction
 _BYTES_PER_HEX = 2500  # at the peak, with the repair
 _LEAST = 0.05  # least scaled Jacobian of a grid that is not repaired
-
-
-@dataclass(frozen=True, eq=False)
-class HexMesh(HasSummary):
-    """A structured hexahedral mesh of a solid.
-
-    Attributes
-    ----------
-    V : ndarray, shape (n, 3)
-        Points, in the source.
-    H : ndarray of int32, shape (k, 8)
-        Corners in the order of VTK: one face counter-clockwise, then the opposite one.
-    grid : ndarray, shape (n, 3)
-        The points of the standard grid in the solid torus they came from.
-    coordinates : ndarray, shape (n, 3)
-        Their (u, v, s).
-    jacobians : ndarray, shape (k, 8)
-        Jacobian at every corner over the product of the three edge lengths, at most 1.
-    volumes : ndarray, shape (k,)
-        Of the trilinear hexahedra.
-    volume_ratios : ndarray, shape (k,)
-        Share of each hexahedron in the volume over the share it has in the standard grid: 1 where
-        the map preserves volume and the hexahedra follow it.
-    n_pulled_back_negative : int
-        Hexahedra with a corner that is not positive before the repair.
-    moved, rim_moved : float
-        How far the repair moved a point, and a boundary point, at most, as a share of the diagonal
-        of the box. Boundary points stay on the surface all the way.
-    """
-
-    V: NDArray[np.float64]
-    H: NDArray[np.int32]
-    grid: NDArray[np.float64]
-    coordinates: NDArray[np.float64]
-    jacobians: NDArray[np.float64]
-    volumes: NDArray[np.float64]
-    volume_ratios: NDArray[np.float64]
-    n_pulled_back_negative: int
-    moved: float
-    rim_moved: float
-
-    @property
-    def volume(self) -> float:
-        """Sum of the volumes."""
-        return float(self.volumes.sum())
-
-    @property
-    def n_negative(self) -> int:
-        """Hexahedra with a corner that is not positive."""
-        return int((~(self.jacobians > 0.0)).any(axis=1).sum())
-
-    def to_dict(self) -> dict[str, Any]:
-        """The figures, JSON-compatible."""
-        return plain_dict(
-            {
-                "n_points": len(self.V),
-                "n_hexahedra": len(self.H),
-                "n_negative": self.n_negative,
-                "n_pulled_back_negative": self.n_pulled_back_negative,
-                "moved": self.moved,
-                "rim_moved": self.rim_moved,
-                "jacobian_min": self.jacobians.min(),
-                "jacobian_mean": self.jacobians.mean(),
-                "volume_ratio_sd": self.volume_ratios.std(),
-                "volume_ratio_min": self.volume_ratios.min(),
-                "volume_ratio_max": self.volume_ratios.max(),
-                "volume": self.volume,
-            }
-        )
-
-    def summary(self) -> str:
-        """A table of the figures."""
-        return table(self.to_dict())
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the mesh as ``.vtu`` or ``.vtk``, with the coordinates and the least Jacobians.
-
-        Raises
-        ------
-        FileFormatError
-            Another suffix.
-        MissingDependencyError
-            meshio is not installed.
-        OSError
-            If the file cannot be written.
-        """
-        path = Path(path)
-        if path.suffix.lower() not in (".vtu", ".vtk"):
-            raise FileFormatError(f"{path}: hexahedra are written as .vtu or .vtk")
-        try:
-            import meshio
-        except ImportError:
-            raise MissingDependencyError(
-                "writing hexahedra needs meshio: pip install 'stretchmap[io]'"
-            ) from None
-        mesh = meshio.Mesh(
-            self.V,
-            [("hexahedron", self.H)],
-            point_data={"coordinates": self.coordinates, "grid": self.grid},
-            cell_data={
-                "jacobian": [self.jacobians.min(axis=1)],
-                "volume_ratio": [self.volume_ratios],
-            },
-        )
-        with atomic_path(path) as temporary:
-            meshio.write(temporary, mesh)
 
 
 def hex_mesh(
@@ -205,52 +95,60 @@ def hex_mesh(
     memory(f"a grid of {count} hexahedra", _BYTES_PER_HEX * count)
     repair = flag("repair", repair)
     points = result.point_map
-    disk, quads, outer = o_grid(block, rings)
-    n = len(disk)
-    u = np.repeat(np.arange(sections) * TWO_PI / sections, n)
-    v = np.tile(np.arctan2(disk[:, 1], disk[:, 0]), sections)
-    share = np.tile(np.hypot(disk[:, 0], disk[:, 1]), sections)
-    here, there = (n * np.arange(sections)[:, None, None], None)
-    there = n * ((np.arange(sections) + 1) % sections)[:, None, None]
-    H = np.concatenate([quads[None] + here, quads[None] + there], axis=2).reshape(-1, 8)
-    reach = _reach(points, torus, u, v)
-    ids = (n * np.arange(sections)[:, None] + outer).ravel()
-    grid = torus.xi(u, v, share * reach)
+    layout = swept_layout(sections, block, rings)
+    H, rim, u, v = layout.H, layout.boundary, layout.u, layout.v
+    grid = torus.xi(u, v, layout.share * _reach(points, torus, u, v))
     located = points.inverse(grid)
     lost = np.flatnonzero(~located.inside)
     if len(lost):
         raise SolverError(f"{len(lost)} points of the grid lie outside the image", lost)
     V = pulled = located.points
-    H = H.astype(np.int32)
-    if _core.mesh.tet_volumes(np.ascontiguousarray(grid), corner_tets(H)).sum() < 0.0:
-        H = np.ascontiguousarray(H[:, [0, 3, 2, 1, 4, 7, 6, 5]])
-    quality = jacobians(V, H)
-    bad = int((~(quality > 0.0)).any(axis=1).sum())
-    shares = hex_volumes(grid, H)
+    n_invalid = int((_core.resample.valid_hexes(V, H) == 0).sum())
+    shares = _core.resample.hex_volumes(grid, H)
     shares /= shares.sum()
-    if repair and not quality.min() >= _LEAST:
-        V = _repaired(result, pulled, H, shares, ids.astype(np.int32), u[ids], v[ids], progress)
-        quality = jacobians(V, H)
-        left = np.flatnonzero(~(quality > 0.0).all(axis=1))
+    if repair and (n_invalid or _core.resample.scaled_jacobians(V, H).min() < _LEAST):
+        V = _repaired(result, pulled, H, shares, rim, u[rim], v[rim], progress)
+        left = np.flatnonzero(_core.resample.valid_hexes(V, H) == 0)
         if len(left):
             raise SolverError(
-                f"{len(left)} hexahedra could not be made positive; try other numbers of sections, "
+                f"{len(left)} hexahedra could not be made valid; try other numbers of sections, "
                 "block or rings, repair=False returns the grid as it was pulled back",
                 left,
             )
-    volumes = hex_volumes(V, H)
-    moves = np.linalg.norm(V - pulled, axis=1) / float(np.linalg.norm(np.ptp(pulled, axis=0)))
+    return _measured(result, layout, grid, pulled, V, n_invalid)
+
+
+def _measured(
+    result: MapResult,
+    layout: Layout,
+    grid: NDArray[np.float64],
+    pulled: NDArray[np.float64],
+    V: NDArray[np.float64],
+    n_invalid: int,
+) -> HexMesh:
+    solid, H = result.mesh, layout.H
+    volumes = _core.resample.hex_volumes(V, H)
+    shares = _core.resample.hex_volumes(grid, H)
+    diagonal = float(np.linalg.norm(np.ptp(solid.V, axis=0)))
+    moves = np.linalg.norm(V - pulled, axis=1) / diagonal
+    distances = boundary_distances(V, boundary_quads(H), solid.surface)
     return HexMesh(
         V=read_only(V),
         H=read_only(H),
         grid=read_only(grid),
-        coordinates=read_only(np.stack(torus.coordinates(grid), axis=-1)),
-        jacobians=read_only(quality),
+        coordinates=read_only(np.stack(torus_of(result).coordinates(grid), axis=-1)),
+        block=read_only(layout.block),
+        layer=read_only(layout.layer),
+        jacobians=read_only(_core.resample.scaled_jacobians(V, H)),
+        valid=read_only(_core.resample.valid_hexes(V, H).astype(bool)),
         volumes=read_only(volumes),
-        volume_ratios=read_only(volumes / volumes.sum() / shares),
-        n_pulled_back_negative=bad,
+        volume_ratios=read_only(volumes / volumes.sum() / (shares / shares.sum())),
+        solid_volume=solid.volume,
+        grid_to_surface=distances[0] / diagonal,
+        surface_to_grid=distances[1] / diagonal,
+        n_pulled_back_invalid=n_invalid,
         moved=float(moves.max()),
-        rim_moved=float(moves[ids].max()),
+        boundary_moved=float(moves[layout.boundary].max()),
     )
 
 

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
+
+from .. import _core
+
+if TYPE_CHECKING:
+    from ..mesh.meshes import TriMesh
+
+_PER_SIDE = 4
 
 # Corner of a hexahedron and the three corners joined to it, positively oriented.
 CORNERS = np.array(
     [[0, 1, 3, 4], [1, 2, 0, 5], [2, 3, 1, 6], [3, 0, 2, 7],
      [4, 7, 5, 0], [5, 4, 6, 1], [6, 5, 7, 2], [7, 6, 4, 3]]
 )  # fmt: skip
+# Faces, seen from outside.
+FACES = np.array(
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+)
 # Parallel edges, one row for each of the three directions, and the directions of CORNERS' edges.
 EDGES = np.array(
     [[[0, 1], [3, 2], [4, 5], [7, 6]],
@@ -26,28 +39,38 @@ def corner_tets(H: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.ascontiguousarray(H[:, CORNERS].reshape(-1, 4))
 
 
-def jacobians(V: NDArray[np.float64], H: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(k, 8) Jacobians at the corners over the product of the lengths of the edges there."""
-    corners = V[H[:, CORNERS]]
-    edges = corners[:, :, 1:] - corners[:, :, :1]
-    lengths = np.linalg.norm(edges, axis=-1).prod(axis=-1)
-    return np.linalg.det(edges) / np.maximum(lengths, 1e-300)
+def boundary_quads(H: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(b, 4) faces that belong to one hexahedron only, seen from outside."""
+    faces = H[:, FACES].reshape(-1, 4)
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.ascontiguousarray(faces[np.sort(first[count == 1])])
 
 
-def hex_volumes(V: NDArray[np.float64], H: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Volumes of the trilinear hexahedra, by Gauss quadrature that is exact for them."""
-    signs = np.array(
-        [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1],
-         [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float
-    )  # fmt: skip
-    total = np.zeros(len(H))
-    for node in signs / np.sqrt(3.0):
-        factors = 1.0 + signs * node
-        slopes = (
-            np.stack(
-                [signs[:, a] * factors[:, (a + 1) % 3] * factors[:, (a + 2) % 3] for a in range(3)]
-            )
-            / 8.0
-        )
-        total += np.linalg.det(np.einsum("ac,kcx->kax", slopes, V[H]))
-    return total
+def boundary_distances(
+    V: NDArray[np.float64], quads: NDArray[np.int32], surface: TriMesh
+) -> tuple[float, float]:
+    """Largest distances from quads to a surface and from the surface to the quads.
+
+    Points of a quad are sampled on the bilinear patch of its corners, `_PER_SIDE` along each side;
+    of the surface the vertices and the centers of its faces are, and the patches are replaced by
+    four triangles each.
+    """
+    t = np.linspace(0.0, 1.0, _PER_SIDE)
+    x, y = (a.ravel() for a in np.meshgrid(t, t))
+    weights = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
+    there = np.einsum("sc,bcx->bsx", weights, V[quads]).reshape(-1, 3)
+    outward = _largest_distance(surface.V, surface.F, there)
+    centers = np.arange(len(V), len(V) + len(quads), dtype=np.int32)
+    fans = [np.stack([quads[:, k], quads[:, (k + 1) % 4], centers], axis=1) for k in range(4)]
+    points = np.concatenate([V, V[quads].mean(axis=1)])
+    sites = np.concatenate([surface.V, surface.V[surface.F].mean(axis=1)])
+    return outward, _largest_distance(points, np.concatenate(fans), sites)
+
+
+def _largest_distance(
+    V: NDArray[np.float64], F: NDArray[np.int32], queries: NDArray[np.float64]
+) -> float:
+    feet, _, _ = _core.maps.SurfaceTree(V, F).closest(np.ascontiguousarray(queries))
+    return float(np.linalg.norm(feet - queries, axis=1).max())

@@ -10,22 +10,16 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress, report
 from ..registration.flat_torus import FlatSurface
-from .o_grid import (
-    _ASPECT,
-    _DRAW_ROUNDS,
-    _DRAW_SWEEPS,
-    _LARGEST_EPSILON,
-    _LEAST_EPSILON,
-    _MOST_ROUNDS,
-    _NEWTON_STEPS,
-    _PULL,
-    _REACH,
-    _SLACK,
-    _SOFT_PULL,
-    _UNTANGLE_SWEEPS,
-    _VOLUME_WEIGHT,
-)
-from .quality import DIRECTIONS, EDGES, corner_tets, jacobians
+from .quality import DIRECTIONS, EDGES, corner_tets
+
+_VOLUME_WEIGHT = 0.3
+_LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
+_MOST_ROUNDS, _DRAW_ROUNDS = 20, 5
+_NEWTON_STEPS, _UNTANGLE_SWEEPS, _DRAW_SWEEPS = 2, 3, 5
+_SLACK = 1.5  # of psi: the scaled Jacobian of a box sheared so far is about 0.25
+_PULL, _SOFT_PULL = 3.0, 0.3  # while points are drawn back, and before
+_ASPECT = 20.0  # largest of the boxes that corners are measured against
+_REACH = 0.2  # of the mean edge at a point: first try of its own step
 
 
 @dataclass
@@ -100,7 +94,7 @@ class GridRepair:
 
     def _count_bad(self) -> int:
         """Hexahedra with a corner that is not positive."""
-        return int((~(jacobians(self.V, self.H) > 0.0)).any(axis=1).sum())
+        return int((~(_core.resample.scaled_jacobians(self.V, self.H) > 0.0)).any(axis=1).sum())
 
     def _boxes(self) -> NDArray[np.float64]:
         """(8 k, 9) rest matrices: a box with the mean edges of each hexahedron and its volume."""

@@ -1,0 +1,53 @@
+// The point of a surface closest to any point: a tree of boxes over its faces.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::maps {
+
+struct Foot {
+  Index face = -1;
+  Eigen::Vector3d point, weights;  // on the surface, and its barycentric coordinates in the face
+  double squared_distance = 0.0;
+};
+
+// The same of n points.
+struct SurfaceFeet {
+  Points points;   // (n, 3)
+  IndexVec face;   // (n)
+  Points weights;  // (n, 3)
+};
+
+class SurfaceTree {
+ public:
+  // points (n, 3), faces (m, 3), which are copied. \pre m > 0
+  SurfaceTree(const PointsRef& points, const FacesRef& faces);
+
+  // The closest points of many.
+  SurfaceFeet feet(const PointsRef& queries, const Poll& poll = {}) const;
+
+  // The closest point; `hint` is a face to begin with, any face is right, a near one is faster.
+  Foot closest(const Eigen::Vector3d& query, Index hint = 0) const;
+
+  const Points& points() const { return points_; }
+  const Faces& faces() const { return faces_; }
+
+ private:
+  struct Node {
+    Eigen::Array3d low, high;
+    Index first, last;  // faces in order_ of a leaf; of an inner node the second child is `last`
+    bool leaf;
+  };
+  Index build(Index first, Index last, std::vector<Eigen::Array3d>& centers);
+  Foot on_face(const Eigen::Vector3d& query, Index face) const;
+
+  Points points_;
+  Faces faces_;
+  std::vector<Index> order_;
+  std::vector<Node> nodes_;  // the first child of node k is k + 1
+};
+
+}  // namespace stretchmap::maps

@@ -1,0 +1,51 @@
+// How far the boundary of a hexahedral grid is from a surface, as a sum of squares.
+//
+//   E(x) = sum_j c_j (n_j . (sum_i w_ji x_i - y_j))^2
+//
+// over samples j of both: points of each boundary quad against the closest points of the surface,
+// and points of the surface against the closest ones of the grid. n_j is the normal of the surface,
+// so that points of the grid glide along it at no cost (distance to the tangent plane). Quads are
+// bilinear; to find their closest points each is replaced by four triangles with its center.
+#pragma once
+
+#include "stretchmap/maps/surface_tree.hpp"
+
+namespace stretchmap::resample {
+
+// Of each sample: the corners of its quad and their weights, and the point and normal of the
+// surface; c_j before the strength is put in, so that they add up to one over the quads' samples
+// and to one over the surface's.
+struct FitSamples {
+  Tets corners;  // (s, 4)
+  Rows weights;  // (s, 4)
+  Points point, normal;
+  Vec share;     // (s) of its half of the area; 0 if the two surfaces face opposite ways
+  Vec distance;  // (s) between the two points
+  Index first_of_surface = 0;
+};
+
+class BoundaryFit {
+ public:
+  // Surface: points (n, 3), faces (m, 3), outward unit normals of the vertices (n, 3); samples of
+  // it by face (s) and barycentric coordinates (s, 3), each standing for the same area. quads (q,
+  // 4), seen from outside. per_side^2 samples are taken of each quad.
+  BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
+              const IndexVecRef& sample_faces, const PointsRef& sample_weights,
+              const TetsRef& quads, int per_side);
+
+  // The samples for grid points x.
+  FitSamples match(const PointsRef& x) const;
+
+ private:
+  Eigen::RowVector3d normal(Index face, const Eigen::Vector3d& weights) const;
+  void match_quads(const PointsRef& x, FitSamples& out) const;
+  void match_surface(const PointsRef& x, FitSamples& out) const;
+
+  maps::SurfaceTree surface_;
+  Points normals_;
+  Points sites_, site_normals_;
+  Tets quads_;
+  int per_side_;
+};
+
+}  // namespace stretchmap::resample

@@ -1,0 +1,71 @@
+// Distortion of a hexahedral grid, and how far its boundary is from a surface.
+//
+//   Psi(x) = sum_h weight_h / 8 sum_c f(psi(J_hc)) + sum_j c_j (n_j . (sum_i w_ji x_i - y_j))^2,
+//   f(psi) = ((1 + psi)^p - 1) / p,     J_hc = [x_1 - x_0, x_2 - x_0, x_3 - x_0] diag(1 / sides),
+//
+// over the eight corners c of each hexahedron, x_1, x_2, x_3 the neighbours of x_0 and psi the
+// energy of element_energy.hpp (Garanzha et al. 2021): the rest shape is a box. The larger p, the
+// more the worst corners count: with shape alone, edges of the right lengths and p = 3/2, f is
+// 2/3 of (1 / scaled Jacobian - 1). The second sum is that of boundary_fit.hpp.
+//
+// Rows of the Hessian are the points of the grid; each is summed by one thread over its hexahedra
+// in ascending order, so that the bits do not depend on the number of threads.
+#pragma once
+
+#include <vector>
+
+#include "stretchmap/linalg/block_solver.hpp"
+#include "stretchmap/resample/boundary_fit.hpp"
+#include "stretchmap/resample/hexahedra.hpp"
+#include "stretchmap/volume/element_energy.hpp"
+
+namespace stretchmap::resample {
+
+struct HexWeights {
+  volume::EnergyWeights corner;
+  double power = 1.0;
+};
+
+struct HexReport {
+  double energy = 0.0;  // +infinity if epsilon = 0 and a corner is not positive
+  double fit = 0.0;     // the second sum alone
+  double min_det = 0.0;
+  Index flips = 0;  // corners with det J <= 0
+};
+
+class HexEnergy {
+ public:
+  // hexes (k, 8), ids below n.
+  HexEnergy(const HexesRef& hexes, Index n);
+
+  // Side lengths (k, 3) and weights (k) of the boxes. To be called before anything else below.
+  void set_rest(const RowsRef& sides, const VecRef& weights);
+  // The corners of a sample have to be those of a face of a hexahedron. factor (s): the c_j.
+  void set_fit(FitSamples samples, const VecRef& factor);
+
+  Index rows() const { return n_; }
+  linalg::BlockMatrix pattern() const;
+  HexReport value(const PointsRef& x, const HexWeights& w) const;
+  // Gradient (n, 3) and positive semi-definite Hessian. \pre value(x, w).energy is finite.
+  void linearise(const PointsRef& x, const HexWeights& w, Points& gradient,
+                 linalg::BlockMatrix& hessian) const;
+
+ private:
+  void load(const PointsRef& x, Index h, volume::ElementBatch& batch) const;
+  void add(const volume::ElementBatch& batch, double power, Index h, Index first, Index last,
+           Points& gradient, double* blocks) const;
+  double gap(const PointsRef& x, Index j) const;
+  void add_fit(const PointsRef& x, Points& gradient, double* blocks) const;
+  Index find_block(Index row, Index column) const;
+
+  Index n_;
+  Hexes hexes_;
+  Rows inverse_;  // (k, 3) reciprocal sides
+  Vec weights_, factor_;
+  FitSamples fit_;
+  IndexVec row_ptr_, col_;
+  IndexRows slot_;                              // (k, 64) block of each pair of corners, or -1
+  std::vector<std::vector<Index>> part_hexes_;  // those that touch the rows of each part, ascending
+};
+
+}  // namespace stretchmap::resample

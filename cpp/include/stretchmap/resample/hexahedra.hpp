@@ -1,0 +1,54 @@
+// Hexahedra: corners, measures, and the proof that one is valid.
+//
+// Corners 0..7 in the order of VTK: 0 1 2 3 round one face, 4 5 6 7 above them. A hexahedron is the
+// image of the unit cube under the trilinear map x(xi, eta, zeta) of its corners; xi runs from
+// corner 0 to 1, eta from 0 to 3, zeta from 0 to 4.
+#pragma once
+
+#include <array>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::resample {
+
+using Hexes = Eigen::Matrix<Index, Eigen::Dynamic, 8, Eigen::RowMajor>;
+using HexesRef = Eigen::Ref<const Hexes>;
+using Rows8 = Eigen::Matrix<double, Eigen::Dynamic, 8, Eigen::RowMajor>;
+
+// Of each corner: itself and its three neighbours, positively oriented in a right hexahedron.
+inline constexpr std::array<std::array<int, 4>, 8> kCorners = {{{0, 1, 3, 4},
+                                                                {1, 2, 0, 5},
+                                                                {2, 3, 1, 6},
+                                                                {3, 0, 2, 7},
+                                                                {4, 7, 5, 0},
+                                                                {5, 4, 6, 1},
+                                                                {6, 5, 7, 2},
+                                                                {7, 6, 4, 3}}};
+
+// Coefficients of det dx/d(xi, eta, zeta) in the Bernstein polynomials of degree (2, 2, 2), the one
+// of B_i(xi) B_j(eta) B_k(zeta) at 9 i + 3 j + k. The determinant is between the least and the
+// largest of them, and equals those with i, j, k in {0, 2} at the corners.
+//
+// No monomial of it has two squares, so that the 27 follow from 20 determinants: the corners' and
+// two mixed ones for each of the twelve edges (Johnen, Weill, Remacle, "Robust and efficient
+// validation of the linear hexahedral element", 2017).
+//
+// \param corner (8) points. \return (27).
+std::array<double, 27> jacobian_coefficients(const std::array<Eigen::Vector3d, 8>& corner);
+
+// Whether the Jacobian determinant is proven to be positive in the whole of each hexahedron: the
+// coefficients are, or those of the parts after halving it again and again are. Each sign is
+// decided against a bound of the rounding errors; a determinant positive by less than that counts
+// as not positive.
+//
+// \param points (n, 3). \param hexes (k, 8), ids below n. \return (k) 1 for valid, else 0.
+Flags valid_hexes(const PointsRef& points, const HexesRef& hexes);
+
+// Jacobian at each corner over the product of the three edge lengths there, (k, 8); 0 where an edge
+// has no length.
+Rows8 scaled_jacobians(const PointsRef& points, const HexesRef& hexes);
+
+// Volumes of the trilinear hexahedra, (k).
+Vec hex_volumes(const PointsRef& points, const HexesRef& hexes);
+
+}  // namespace stretchmap::resample

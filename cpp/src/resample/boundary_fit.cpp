@@ -1,0 +1,123 @@
+#include "stretchmap/resample/boundary_fit.hpp"
+
+#include "stretchmap/base/parallel.hpp"
+
+namespace stretchmap::resample {
+namespace {
+
+using Eigen::RowVector3d;
+using Eigen::RowVector4d;
+using Eigen::Vector3d;
+
+constexpr Index kSamplesPerChunk = 512;
+
+}  // namespace
+
+BoundaryFit::BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
+                         const IndexVecRef& sample_faces, const PointsRef& sample_weights,
+                         const TetsRef& quads, int per_side)
+    : surface_(points, faces), normals_(normals), quads_(quads), per_side_(per_side) {
+  const Index s = static_cast<Index>(sample_faces.size());
+  sites_.setZero(s, 3);
+  site_normals_.resize(s, 3);
+  for (Index j = 0; j < s; ++j) {
+    const Index f = sample_faces[j];
+    for (int c = 0; c < 3; ++c) sites_.row(j) += sample_weights(j, c) * points.row(faces(f, c));
+    site_normals_.row(j) = normal(f, sample_weights.row(j).transpose());
+  }
+}
+
+RowVector3d BoundaryFit::normal(Index face, const Vector3d& weights) const {
+  RowVector3d sum = RowVector3d::Zero();
+  for (int c = 0; c < 3; ++c) sum += weights[c] * normals_.row(surface_.faces()(face, c));
+  return sum.normalized();
+}
+
+FitSamples BoundaryFit::match(const PointsRef& x) const {
+  FitSamples out;
+  const Index q = static_cast<Index>(quads_.rows()) * per_side_ * per_side_;
+  const Index s = q + static_cast<Index>(sites_.rows());
+  out.first_of_surface = q;
+  out.corners.resize(s, 4);
+  out.weights.resize(s, 4);
+  out.point.resize(s, 3);
+  out.normal.resize(s, 3);
+  out.share.resize(s);
+  out.distance.resize(s);
+  match_quads(x, out);
+  match_surface(x, out);
+  return out;
+}
+
+void BoundaryFit::match_quads(const PointsRef& x, FitSamples& out) const {
+  const Index n = static_cast<Index>(quads_.rows()), per = per_side_ * per_side_;
+  for_chunks(
+      n,
+      [&](Index begin, Index end) {
+        for (Index b = begin; b < end; ++b) {
+          const RowVector3d d1 = x.row(quads_(b, 2)) - x.row(quads_(b, 0)),
+                            d2 = x.row(quads_(b, 3)) - x.row(quads_(b, 1));
+          const double area = 0.5 * d1.cross(d2).norm();
+          Index hint = 0;
+          for (Index k = 0; k < per; ++k) {
+            const double s = (k % per_side_ + 0.5) / per_side_,
+                         t = (k / per_side_ + 0.5) / per_side_;
+            const RowVector4d w((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t);
+            Vector3d here = Vector3d::Zero();
+            for (int c = 0; c < 4; ++c) here += w[c] * x.row(quads_(b, c)).transpose();
+            const maps::Foot foot = surface_.closest(here, hint);
+            hint = foot.face;
+            const Index j = per * b + k;
+            out.corners.row(j) = quads_.row(b);
+            out.weights.row(j) = w;
+            out.point.row(j) = foot.point.transpose();
+            out.normal.row(j) = normal(foot.face, foot.weights);
+            out.distance[j] = std::sqrt(foot.squared_distance);
+            out.share[j] = area / per;
+          }
+        }
+      },
+      kSamplesPerChunk / per + 1);
+  const Index q = out.first_of_surface;
+  out.share.head(q) /= out.share.head(q).sum();
+}
+
+void BoundaryFit::match_surface(const PointsRef& x, FitSamples& out) const {
+  const Index n = static_cast<Index>(x.rows()), q = static_cast<Index>(quads_.rows());
+  Points points(n + q, 3);
+  points.topRows(n) = x;
+  Faces fans(4 * q, 3);
+  for (Index b = 0; b < q; ++b) {
+    points.row(n + b).setZero();
+    for (int c = 0; c < 4; ++c) {
+      points.row(n + b) += 0.25 * x.row(quads_(b, c));
+      fans.row(4 * b + c) << quads_(b, c), quads_(b, (c + 1) % 4), n + b;
+    }
+  }
+  const maps::SurfaceTree grid(points, fans);
+  const Index s = static_cast<Index>(sites_.rows()), first = out.first_of_surface;
+  for_chunks(
+      s,
+      [&](Index begin, Index end) {
+        Index hint = 0;
+        for (Index i = begin; i < end; ++i) {
+          const maps::Foot foot = grid.closest(sites_.row(i).transpose(), hint);
+          hint = foot.face;
+          const Index quad = foot.face / 4, c = foot.face % 4, j = first + i;
+          RowVector4d w = RowVector4d::Constant(0.25 * foot.weights[2]);
+          w[c] += foot.weights[0];
+          w[(c + 1) % 4] += foot.weights[1];
+          const auto corner = [&](int k) -> RowVector3d { return points.row(fans(foot.face, k)); };
+          const RowVector3d facing = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+          out.corners.row(j) = quads_.row(quad);
+          out.weights.row(j) = w;
+          out.point.row(j) = sites_.row(i);
+          out.normal.row(j) = site_normals_.row(i);
+          out.distance[j] = std::sqrt(foot.squared_distance);
+          out.share[j] = facing.dot(site_normals_.row(i)) > 0.0 ? 1.0 / s : 0.0;
+        }
+      },
+      kSamplesPerChunk);
+}
+
+}  // namespace stretchmap::resample

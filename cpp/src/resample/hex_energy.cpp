@@ -1,0 +1,221 @@
+#include "stretchmap/resample/hex_energy.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "stretchmap/base/parallel.hpp"
+#include "stretchmap/linalg/pattern.hpp"
+
+namespace stretchmap::resample {
+namespace {
+
+using Eigen::RowVector3d;
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using Block = Eigen::Map<RowMatrix3d>;
+using volume::ElementBatch;
+
+// Directions (0, 1, 2) of the edges from each corner to its three neighbours.
+constexpr int kDirection[8][3] = {{0, 1, 2}, {1, 0, 2}, {0, 1, 2}, {1, 0, 2},
+                                  {1, 0, 2}, {0, 1, 2}, {1, 0, 2}, {0, 1, 2}};
+
+// Which corners have a tet in common: all but the ends of the four long diagonals.
+std::array<std::array<bool, 8>, 8> coupled_corners() {
+  std::array<std::array<bool, 8>, 8> out{};
+  for (const auto& tet : kCorners)
+    for (const int a : tet)
+      for (const int b : tet) out[a][b] = true;
+  return out;
+}
+
+// Blocks of the tet at corner c; rows and columns of its first point are minus the others' sums.
+void tet_blocks(const ElementBatch& batch, int c, double slope, RowMatrix3d (&H)[4][4]) {
+  int at = 0;
+  for (int a = 1; a < 4; ++a)
+    for (int b = a; b < 4; ++b, ++at) {
+      for (int i = 0; i < 9; ++i) H[a][b](i / 3, i % 3) = slope * batch.block[at][i][c];
+      if (b > a) H[b][a] = H[a][b].transpose();
+    }
+  for (int a = 1; a < 4; ++a) {
+    H[a][0] = -(H[a][1] + H[a][2] + H[a][3]);
+    H[0][a] = H[a][0].transpose();
+  }
+  H[0][0] = -(H[0][1] + H[0][2] + H[0][3]);
+}
+
+}  // namespace
+
+HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
+  const Index k = static_cast<Index>(hexes_.rows());
+  std::vector<Index> start(n + 1, 0), around(8 * static_cast<std::size_t>(k));
+  for (Index h = 0; h < k; ++h)
+    for (int c = 0; c < 8; ++c) ++start[hexes_(h, c) + 1];
+  for (Index i = 0; i < n; ++i) start[i + 1] += start[i];
+  std::vector<Index> cursor(start.begin(), start.end() - 1);
+  for (Index h = 0; h < k; ++h)
+    for (int c = 0; c < 8; ++c) around[cursor[hexes_(h, c)]++] = 8 * h + c;
+
+  const auto coupled = coupled_corners();
+  const linalg::Pattern pattern = linalg::build_pattern(n, n, [&](Index i, linalg::RowSet& row) {
+    for (Index p = start[i]; p < start[i + 1]; ++p)
+      for (int b = 0; b < 8; ++b)
+        if (coupled[around[p] % 8][b]) row.add(hexes_(around[p] / 8, b));
+  });
+  row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n + 1);
+  col_ = Eigen::Map<const IndexVec>(pattern.col.data(), row_ptr_[n]);
+  slot_.setConstant(k, 64, -1);
+  for_chunks(k, [&](Index begin, Index end) {
+    for (Index h = begin; h < end; ++h)
+      for (int a = 0; a < 8; ++a)
+        for (int b = 0; b < 8; ++b)
+          if (coupled[a][b]) slot_(h, 8 * a + b) = find_block(hexes_(h, a), hexes_(h, b));
+  });
+  part_hexes_.resize(chunk_count(n));
+  for_chunks(n, [&](Index begin, Index end) {
+    std::vector<Index>& list = part_hexes_[begin / kChunk];
+    for (Index p = start[begin]; p < start[end]; ++p) list.push_back(around[p] / 8);
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+  });
+}
+
+void HexEnergy::set_rest(const RowsRef& sides, const VecRef& weights) {
+  inverse_ = sides.array().inverse();
+  weights_ = weights / 8.0;
+}
+
+void HexEnergy::set_fit(FitSamples samples, const VecRef& factor) {
+  fit_ = std::move(samples);
+  factor_ = factor;
+}
+
+linalg::BlockMatrix HexEnergy::pattern() const {
+  linalg::BlockMatrix out;
+  out.row_ptr = row_ptr_;
+  out.col = col_;
+  out.values.setZero(9 * static_cast<Eigen::Index>(col_.size()));
+  return out;
+}
+
+Index HexEnergy::find_block(Index row, Index column) const {
+  const Index* first = col_.data() + row_ptr_[row];
+  return static_cast<Index>(std::lower_bound(first, col_.data() + row_ptr_[row + 1], column) -
+                            col_.data());
+}
+
+void HexEnergy::load(const PointsRef& x, Index h, ElementBatch& batch) const {
+  static_assert(volume::kLanes == 8, "one lane for each corner");
+  for (int c = 0; c < 8; ++c) {
+    const double* origin = x.data() + 3 * static_cast<std::ptrdiff_t>(hexes_(h, c));
+    for (int a = 0; a < 3; ++a) {
+      const double* end = x.data() + 3 * static_cast<std::ptrdiff_t>(hexes_(h, kCorners[c][a + 1]));
+      for (int i = 0; i < 3; ++i) batch.edges[3 * a + i][c] = end[i] - origin[i];
+      for (int b = 0; b < 3; ++b) batch.rest[3 * a + b][c] = 0.0;
+      batch.rest[3 * a + a][c] = inverse_(h, kDirection[c][a]);
+    }
+    batch.weight[c] = 1.0;
+  }
+}
+
+// From the tangent plane of sample j.
+double HexEnergy::gap(const PointsRef& x, Index j) const {
+  RowVector3d p = -fit_.point.row(j);
+  for (int c = 0; c < 4; ++c) p += fit_.weights(j, c) * x.row(fit_.corners(j, c));
+  return p.dot(fit_.normal.row(j));
+}
+
+HexReport HexEnergy::value(const PointsRef& x, const HexWeights& w) const {
+  const Index k = static_cast<Index>(hexes_.rows());
+  Vec least(k);
+  IndexVec flips(k);
+  const double energy = sum_chunks<1>(k, [&](Index begin, Index end, std::array<double, 1>& sums) {
+    ElementBatch batch;
+    for (Index h = begin; h < end; ++h) {
+      load(x, h, batch);
+      element_values(batch, w.corner);
+      double sum = 0.0;
+      least[h] = *std::min_element(batch.det, batch.det + 8);
+      flips[h] = 0;
+      for (int c = 0; c < 8; ++c) {
+        sum += (std::pow(1.0 + batch.energy[c], w.power) - 1.0) / w.power;
+        flips[h] += !(batch.det[c] > 0.0);
+      }
+      sums[0] += weights_[h] * sum;
+    }
+  })[0];
+  const double fit = sum_chunks<1>(static_cast<Index>(factor_.size()),
+                                   [&](Index begin, Index end, std::array<double, 1>& sums) {
+                                     for (Index j = begin; j < end; ++j) {
+                                       const double d = gap(x, j);
+                                       sums[0] += factor_[j] * d * d;
+                                     }
+                                   })[0];
+  return {energy + fit, fit, k > 0 ? least.minCoeff() : 0.0, flips.sum()};
+}
+
+// Adds the share of a hexahedron to the rows in [first, last).
+void HexEnergy::add(const ElementBatch& batch, double power, Index h, Index first, Index last,
+                    Points& gradient, double* blocks) const {
+  for (int c = 0; c < 8; ++c) {
+    const double base = 1.0 + batch.energy[c];
+    const double slope = weights_[h] * std::pow(base, power - 1.0);
+    const double curvature = (power - 1.0) / base * slope;
+    RowVector3d g[4];
+    g[0].setZero();
+    for (int a = 0; a < 3; ++a) {
+      for (int i = 0; i < 3; ++i) g[a + 1][i] = batch.gradient[3 * a + i][c];
+      g[0] -= g[a + 1];
+    }
+    RowMatrix3d H[4][4];
+    tet_blocks(batch, c, slope, H);
+    for (int a = 0; a < 4; ++a) {
+      const int corner = kCorners[c][a];
+      const Index row = hexes_(h, corner);
+      if (row < first || row >= last) continue;
+      gradient.row(row) += slope * g[a];
+      for (int b = 0; b < 4; ++b) {
+        if (curvature > 0.0) H[a][b] += curvature * g[a].transpose() * g[b];
+        const Index slot = slot_(h, 8 * corner + kCorners[c][b]);
+        Block(blocks + 9 * static_cast<std::ptrdiff_t>(slot)) += H[a][b];
+      }
+    }
+  }
+}
+
+void HexEnergy::linearise(const PointsRef& x, const HexWeights& w, Points& gradient,
+                          linalg::BlockMatrix& hessian) const {
+  gradient.setZero(n_, 3);
+  hessian.values.setZero();
+  double* blocks = hessian.values.data();
+  for_chunks(n_, [&](Index begin, Index end) {
+    ElementBatch batch;
+    for (const Index h : part_hexes_[begin / kChunk]) {
+      load(x, h, batch);
+      element_hessians(batch, w.corner);
+      add(batch, w.power, h, begin, end, gradient, blocks);
+    }
+  });
+  add_fit(x, gradient, blocks);
+}
+
+void HexEnergy::add_fit(const PointsRef& x, Points& gradient, double* blocks) const {
+  for (Index j = 0; j < factor_.size(); ++j) {
+    const RowVector3d normal = fit_.normal.row(j);
+    const double slope = 2.0 * factor_[j] * gap(x, j);
+    const RowMatrix3d plane = 2.0 * factor_[j] * normal.transpose() * normal;
+    for (int a = 0; a < 4; ++a) {
+      const double weight = fit_.weights(j, a);
+      if (weight == 0.0) continue;
+      const Index row = fit_.corners(j, a);
+      gradient.row(row) += slope * weight * normal;
+      for (int b = 0; b < 4; ++b) {
+        if (fit_.weights(j, b) == 0.0) continue;
+        const Index slot = find_block(row, fit_.corners(j, b));
+        Block(blocks + 9 * static_cast<std::ptrdiff_t>(slot)) +=
+            weight * fit_.weights(j, b) * plane;
+      }
+    }
+  }
+}
+
+}  // namespace stretchmap::resample

@@ -1,0 +1,83 @@
+"""The energy of a grid against finite differences, and its samples of the boundary."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import stretchmap as sm
+from stretchmap import _core, samples
+from stretchmap.errors import SolverError
+from stretchmap.resample.layout import swept_layout
+from stretchmap.resample.quality import boundary_quads
+
+TORUS = sm.Torus(3.0, 1.0)
+
+
+def a_grid(noise):
+    layout = swept_layout(8, 2, 1)
+    V = TORUS.xi(layout.u, layout.v, layout.share)
+    V += noise * np.random.default_rng(1).standard_normal(V.shape)
+    return layout.H, np.ascontiguousarray(V)
+
+
+def a_fit(H):
+    surface = samples.torus_surface(16, 12, R=3.0, r=1.0)
+    normals = TORUS.normal(*TORUS.coordinates(surface.V)[:2])
+    faces = np.arange(0, surface.n_faces, 3, dtype=np.int32)
+    weights = np.full((len(faces), 3), 1.0 / 3.0)
+    quads = boundary_quads(H)
+    return _core.resample.BoundaryFit(surface.V, surface.F, normals, faces, weights, quads, 2)
+
+
+@pytest.mark.parametrize(("epsilon", "power"), [(0.0, 1.0), (0.0, 2.5), (0.2, 1.0)])
+def test_gradient_and_hessian_are_those_of_the_value(epsilon, power):
+    H, V = a_grid(0.02)
+    newton = _core.resample.HexNewton(H, len(V))
+    rng = np.random.default_rng(2)
+    newton.set_rest(rng.uniform(0.5, 1.5, (len(H), 3)), rng.uniform(0.5, 1.5, len(H)))
+    samples_ = a_fit(H).match(V)
+    newton.set_fit(samples_, rng.uniform(1.0, 2.0, len(samples_.share)))
+    corner = _core.volume.EnergyWeights(1.0, 0.2, epsilon)
+    gradient, start, col, values = newton.model(V, corner, power)
+    way = rng.standard_normal(V.shape)
+    step = 1e-6
+    ahead, behind = (newton.value(V + s * step * way, corner, power) for s in (1.0, -1.0))
+    slope = (ahead.energy - behind.energy) / (2.0 * step)
+    assert slope == pytest.approx((gradient * way).sum(), rel=1e-6)
+    n = 3 * len(V)
+    hessian = sp.bsr_matrix((np.reshape(values, (-1, 3, 3)), col, start), shape=(n, n)).toarray()
+    assert np.allclose(hessian, hessian.T, atol=1e-9 * abs(hessian).max())
+    assert np.linalg.eigvalsh(hessian).min() > -1e-9 * abs(hessian).max()
+    # The Hessian of the elements is projected, so it bounds the true curvature from above.
+    true = (newton.model(V + step * way, corner, power)[0] - gradient) / step
+    assert (way * true).sum() <= (way.ravel() @ hessian @ way.ravel()) * (1.0 + 1e-4)
+
+
+def test_samples_lie_on_both_surfaces():
+    H, V = a_grid(0.0)
+    matched = a_fit(H).match(V)
+    first = matched.first_of_surface
+    assert first == 4 * len(boundary_quads(H))
+    assert matched.share[:first].sum() == pytest.approx(1.0)
+    assert matched.share[first:].sum() == pytest.approx(1.0)
+    assert 0.0 < matched.distance.max() < 0.5
+
+
+def test_newton_steps_untangle_and_never_raise_the_energy():
+    H, V = a_grid(0.15)
+    newton = _core.resample.HexNewton(H, len(V))
+    edges = np.full((len(H), 3), 0.6)
+    newton.set_rest(edges, np.ones(len(H)))
+    barrier = _core.volume.EnergyWeights(1.0, 1.0, 0.0)
+    assert newton.value(V, barrier).flips > 0
+    with pytest.raises(SolverError, match="not positive"):
+        newton.run(V, barrier, 1.0, 3)
+    for epsilon in (0.3, 0.1, 0.03):
+        V, report = newton.run(V, _core.volume.EnergyWeights(1.0, 1.0, epsilon), 1.0, 20)
+        assert report.after.energy < report.before.energy
+    assert report.after.flips == 0
+    V, last = newton.run(V, barrier, 2.0, 10)
+    assert last.after.energy < last.before.energy and last.after.min_det > 0.0
+    assert _core.resample.scaled_jacobians(V, H).min() > 0.3
