@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import importlib
 import os
-from typing import Any
+from typing import TYPE_CHECKING
 
-from ._version import __version__
+from ._version import __version__ as __version__
 
 
 def _load_core() -> None:
@@ -28,49 +28,125 @@ def _load_core() -> None:
 
 _load_core()
 
-# name -> module; loaded on first use so that `import stretchmap` stays fast.
+# What type checkers see; at run time `_EXPORTS` loads the same names on first use, so that
+# `import stretchmap` stays fast.
+if TYPE_CHECKING:
+    from . import errors as errors
+    from . import plot as plot
+    from . import samples as samples
+    from .area.map import AreaMap as AreaMap
+    from .area.map import area_map as area_map
+    from .base.progress import Progress as Progress
+    from .base.threads import threads as threads
+    from .base.torus import Torus as Torus
+    from .certificate.checks import certify as certify
+    from .certificate.checks import certify_file as certify_file
+    from .certificate.comparison import Comparison as Comparison
+    from .certificate.comparison import compare as compare
+    from .certificate.findings import Certificate as Certificate
+    from .conformal.map import ConformalMap as ConformalMap
+    from .conformal.map import conformal_map as conformal_map
+    from .forms.harmonic import HarmonicForms as HarmonicForms
+    from .forms.holomorphic import HolomorphicForms as HolomorphicForms
+    from .homology.basis import HomologyBasis as HomologyBasis
+    from .homology.basis import homology_basis as homology_basis
+    from .homology.representatives import harmonic_forms as harmonic_forms
+    from .homology.representatives import holomorphic_forms as holomorphic_forms
+    from .io.read_write import read as read
+    from .io.read_write import read_solid as read_solid
+    from .io.read_write import read_surface as read_surface
+    from .io.read_write import write as write
+    from .maps.files import LoadedMap as LoadedMap
+    from .maps.files import load_map as load_map
+    from .maps.history import IterationRecord as IterationRecord
+    from .maps.points import Located as Located
+    from .maps.points import PointMap as PointMap
+    from .maps.result import MapResult as MapResult
+    from .measures.elements import Distortion as Distortion
+    from .measures.elements import distortion as distortion
+    from .mesh.diagnosis import Diagnosis as Diagnosis
+    from .mesh.meshes import TetMesh as TetMesh
+    from .mesh.meshes import TriMesh as TriMesh
+    from .partitions.parts import Partition as Partition
+    from .partitions.parts import partition as partition
+    from .plot.morphing import Morph as Morph
+    from .plot.morphing import morph as morph
+    from .registration.landmarks import Landmarks as Landmarks
+    from .registration.landmarks import read_landmarks as read_landmarks
+    from .registration.map import Registration as Registration
+    from .registration.map import register as register
+    from .resample.fields import transfer as transfer
+    from .resample.hexes import HexMesh as HexMesh
+    from .resample.hexes import hex_mesh as hex_mesh
+    from .volume.map import VolumeMap as VolumeMap
+    from .volume.map import volume_map as volume_map
+    from .volume.options import FlipFreeOptions as FlipFreeOptions
+
 _EXPORTS = {
-    "TriMesh": "mesh.meshes",
-    "TetMesh": "mesh.meshes",
-    "read": "io",
-    "write": "io",
     "Torus": "base.torus",
+    "Progress": "base.progress",
+    "threads": "base.threads",
+    "TetMesh": "mesh.meshes",
+    "TriMesh": "mesh.meshes",
+    "Diagnosis": "mesh.diagnosis",
+    "read": "io.read_write",
+    "read_solid": "io.read_write",
+    "read_surface": "io.read_write",
+    "write": "io.read_write",
+    "HarmonicForms": "forms.harmonic",
+    "HolomorphicForms": "forms.holomorphic",
+    "Distortion": "measures.elements",
+    "distortion": "measures.elements",
+    "HomologyBasis": "homology.basis",
     "homology_basis": "homology.basis",
     "harmonic_forms": "homology.representatives",
     "holomorphic_forms": "homology.representatives",
+    "IterationRecord": "maps.history",
+    "LoadedMap": "maps.files",
+    "load_map": "maps.files",
+    "MapResult": "maps.result",
+    "Located": "maps.points",
+    "PointMap": "maps.points",
+    "ConformalMap": "conformal.map",
     "conformal_map": "conformal.map",
-    "area_map": "area.map",
-    "threads": "base.threads",
-    "volume_map": "volume.map",
-    "FlipFreeOptions": "volume.options",
-    "distortion": "measures.elements",
+    "Certificate": "certificate.findings",
     "certify": "certificate.checks",
     "certify_file": "certificate.checks",
-    "compare": "certificate.comparison",
     "Comparison": "certificate.comparison",
-    "load_map": "maps.files",
-    "PointMap": "maps.points",
+    "compare": "certificate.comparison",
+    "Partition": "partitions.parts",
     "partition": "partitions.parts",
-    "register": "registration.map",
+    "AreaMap": "area.map",
+    "area_map": "area.map",
+    "FlipFreeOptions": "volume.options",
+    "VolumeMap": "volume.map",
+    "volume_map": "volume.map",
     "Landmarks": "registration.landmarks",
     "read_landmarks": "registration.landmarks",
+    "Registration": "registration.map",
+    "register": "registration.map",
+    "HexMesh": "resample.hexes",
     "hex_mesh": "resample.hexes",
     "transfer": "resample.fields",
+    "Morph": "plot.morphing",
     "morph": "plot.morphing",
 }
-_MODULES = {"errors", "samples", "plot"}
+_ROOMS = ("errors", "plot", "samples")
 
-__all__ = ["__version__", *_EXPORTS, *sorted(_MODULES)]
+__all__ = ["__version__", *_EXPORTS, *_ROOMS]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _EXPORTS:
-        value = getattr(importlib.import_module(f"{__name__}.{_EXPORTS[name]}"), name)
-        globals()[name] = value
-        return value
-    if name in _MODULES:
-        return importlib.import_module(f"{__name__}.{name}")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+if not TYPE_CHECKING:  # else a checker would take any name for one of the package
+
+    def __getattr__(name):
+        """Load a public name on first use."""
+        if name in _EXPORTS:
+            value = getattr(importlib.import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+            globals()[name] = value
+            return value
+        if name in _ROOMS:
+            return importlib.import_module(f"{__name__}.{name}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

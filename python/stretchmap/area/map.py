@@ -18,6 +18,7 @@ from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import OptionError
+from ..maps.history import IterationRecord
 from ..maps.result import MapResult
 from .finish import finish_areas
 from .search import search_phase
@@ -32,7 +33,7 @@ __all__ = ["AreaMap", "area_map"]
 _log = logging.getLogger("stretchmap")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class AreaMap(MapResult):
     """An area-preserving map onto a torus of revolution.
 
@@ -179,7 +180,7 @@ def area_map(
     clock = time.perf_counter()
     seconds: dict[str, float] = {}
     if conformal is None:
-        conformal = conformal_map(surface, basis)
+        conformal = conformal_map(surface, basis=basis, progress=progress)
     clock = _lap(seconds, "conformal", clock)
 
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
@@ -191,7 +192,8 @@ def area_map(
     angles = start_angles(chart, turns, phase, ratio)
     clock = _lap(seconds, "phase", clock)
 
-    records, converged, reason = [], True, "stretch energy at rest"
+    records: list[IterationRecord] = []
+    converged, reason = True, "stretch energy at rest"
     if finish != "none":
         problem = _core.area.GlideProblem(
             chart, _core.area.SurfaceReference(surface.V, surface.F), ratio

@@ -27,8 +27,8 @@ def search_phase(
 ) -> tuple[float, float]:
     """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image."""
     sample = surface.F[:: -(-len(surface.F) // _SAMPLE)]
-    used, faces = np.unique(sample, return_inverse=True)
-    faces = faces.reshape(sample.shape).astype(np.int32)
+    used, inverse = np.unique(sample, return_inverse=True)
+    faces = inverse.reshape(sample.shape).astype(np.int32)
     reference = _core.area.SurfaceReference(surface.V[used], faces)
     turns = turns[used]
     phases = np.arange(_PHASES) / _PHASES if phase is None else np.array([float(phase)])
@@ -59,7 +59,9 @@ def _best(
     turns: NDArray[np.float64],
     candidates: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    if len(candidates) == 1:
-        return candidates[0]
-    qualities = _core.area.phase_qualities(reference, faces, turns, candidates)
-    return candidates[int(np.argmin([quality.energy for quality in qualities]))]
+    best = 0
+    if len(candidates) > 1:
+        qualities = _core.area.phase_qualities(reference, faces, turns, candidates)
+        best = int(np.argmin([quality.energy for quality in qualities]))
+    row: NDArray[np.float64] = candidates[best]
+    return row

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import platform
+import re
 from collections.abc import Mapping
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -27,7 +29,7 @@ def versions() -> dict[str, str]:
 def plain(value: Any) -> Any:
     """A copy made of what JSON knows: NumPy scalars and arrays converted, non-finite to None."""
     if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
+        return plain_dict(value)
     if isinstance(value, (list, tuple)):
         return [plain(v) for v in value]
     if isinstance(value, np.ndarray):
@@ -37,6 +39,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def plain_dict(rows: Mapping[Any, Any]) -> dict[str, Any]:
+    """`plain` of every entry, by the name of its key."""
+    return {str(name): plain(value) for name, value in rows.items()}
 
 
 def table(rows: Mapping[str, Any]) -> str:
@@ -56,3 +63,30 @@ def cell(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"({', '.join(cell(entry) for entry in value)})"
     return format(value, ".6g") if isinstance(value, float) else str(value)
+
+
+class HasSummary:
+    """What notebooks show as a table: anything with a ``summary()`` of names and values."""
+
+    def summary(self) -> str:
+        """A table of names and values."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        return html(self.summary())
+
+
+def html(text: str) -> str:
+    """A table of `table` as HTML: one row per line, cells parted by two spaces or more.
+
+    Examples
+    --------
+    >>> html(table({"n_tets": 6}))
+    '<table><tbody><tr><th>n tets</th><td>6</td></tr></tbody></table>'
+    """
+    rows = []
+    for line in text.splitlines():
+        name, *values = re.split(r"\s{2,}", line.rstrip())
+        cells = "".join(f"<td>{escape(value)}</td>" for value in values)
+        rows.append(f"<tr><th>{escape(name)}</th>{cells}</tr>")
+    return f"<table><tbody>{''.join(rows)}</tbody></table>"

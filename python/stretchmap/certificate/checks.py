@@ -97,18 +97,17 @@ def certify(
     found = Findings()
     if not _topology(found, mesh):
         return found.certificate("")
-    solid = mesh if isinstance(mesh, TetMesh) else None
-    if solid is None:
-        surface, boundary_image = mesh, points
+    if isinstance(mesh, TetMesh):
+        surface = mesh.surface
+        boundary_image = np.ascontiguousarray(points[mesh.boundary_vertices])
+        _positive(found, "source_positive", mesh.V, mesh.T, "source")
+        _positive(found, "image_positive", points, mesh.T, "image")
     else:
-        surface = solid.surface
-        boundary_image = np.ascontiguousarray(points[solid.boundary_vertices])
-        _positive(found, "source_positive", solid.V, solid.T, "source")
-        _positive(found, "image_positive", points, solid.T, "image")
+        surface, boundary_image = mesh, points
     _embedded(found, "source_embedded", surface.V, surface.F, "source surface")
     proof = _boundary(found, boundary_image, surface.F, torus, tolerance)
-    if solid is not None:
-        _volumes(found, points, solid.T, boundary_image, surface.F)
+    if isinstance(mesh, TetMesh):
+        _volumes(found, points, mesh.T, boundary_image, surface.F)
         proof = f"all image volumes positive and {proof}"
     return found.certificate(proof)
 
@@ -198,7 +197,7 @@ def _boundary(
             flipped,
         )
         _embedded(found, "boundary_embedded", image, F, "boundary image")
-        winding = chart_areas(F, np.stack([u, v], axis=1)).sum() / TWO_PI**2
+        winding = float(chart_areas(F, np.stack([u, v], axis=1)).sum()) / TWO_PI**2
         proof = "the boundary image does not cross itself (exact tests)"
     else:
         proof = "the boundary image is a graph over the torus, covered once"
@@ -229,7 +228,7 @@ def _volumes(
     enclosed = _core.mesh.enclosed_volume(boundary_image, F)
     # Either sum is off by less than its number of terms in units of rounding of the bounding box.
     box = float(np.prod(np.ptp(image, axis=0)))
-    bound = 8.0 * np.finfo(float).eps * (len(T) + len(F)) * box
+    bound = 8.0 * float(np.finfo(float).eps) * (len(T) + len(F)) * box
     found.quantities["image_volume"] = total
     found.quantities["enclosed_volume"] = enclosed
     found.quantities["smallest_volume"] = (

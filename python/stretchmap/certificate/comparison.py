@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ..base.tables import cell, plain
+from ..base.tables import HasSummary, cell, plain_dict
 from ..base.torus import Torus
 from ..errors import OptionError
 from ..maps.result import MapResult
@@ -21,7 +21,7 @@ from .findings import Certificate
 __all__ = ["Comparison", "compare"]
 
 # Figures of the table: heading, and how it comes from distortion and certificate.
-_COLUMNS = {
+_COLUMNS: dict[str, Callable[[Distortion, Certificate], object]] = {
     "certified": lambda d, c: c.certified,
     "flips": lambda d, c: d.flips,
     "ring std": lambda d, c: d.ring_std,
@@ -33,7 +33,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(HasSummary):
     """Maps of one mesh side by side.
 
     Attributes
@@ -61,7 +61,7 @@ class Comparison:
 
     def to_dict(self) -> dict[str, Any]:
         """All scalars, JSON-compatible."""
-        return plain(
+        return plain_dict(
             {
                 name: found.to_dict()
                 | {

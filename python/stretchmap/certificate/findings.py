@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.tables import plain, table
+from ..base.tables import HasSummary, plain_dict, table
 
 MOST_IDS = 1000
 
@@ -17,7 +17,7 @@ __all__ = ["Certificate"]
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(HasSummary):
     """Outcome of :func:`certify`.
 
     Attributes
@@ -51,7 +51,7 @@ class Certificate:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, JSON-compatible."""
-        return plain(self.__dict__)
+        return plain_dict(self.__dict__)
 
     def summary(self) -> str:
         """A table of the checks and quantities."""

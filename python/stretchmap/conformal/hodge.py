@@ -44,8 +44,7 @@ def hodge_lattice(surface: TriMesh, basis: HomologyBasis | None = None) -> NDArr
         basis = homology_basis(surface)
     basis.require_torus()
     coefficients = holomorphic_forms(surface, basis).coefficients
-    change = basis.torus_matrix
-    mu = change @ coefficients @ basis.torus_classes.T
+    mu = basis.torus_matrix @ coefficients @ basis.torus_classes.T
     periods = np.eye(2) + 1j * mu  # a_{l, j}: zeta_l over the longitude, over the meridian
     beta = _most_rectangular(periods)
     first, second = (1.0 - beta) * periods[0] + beta * periods[1]
@@ -59,7 +58,7 @@ def _most_rectangular(a: NDArray[np.complex128]) -> float:
 
     def product(beta: float) -> float:
         first, second = (1.0 - beta) * a[0] + beta * a[1]
-        return (first * second.conjugate()).real
+        return float((first * second.conjugate()).real)
 
     middle, ends = product(0.0), (product(-1.0), product(1.0))
     quadratic = [0.5 * (ends[0] + ends[1]) - middle, 0.5 * (ends[1] - ends[0]), middle]

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
+from ..base.progress import Progress, report
+from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..errors import OptionError
-from ..forms.harmonic import WEIGHTS, HarmonicForms
+from ..forms.harmonic import WEIGHTS, HarmonicForms, Weights
 from ..homology.basis import HomologyBasis, homology_basis
 from ..homology.representatives import harmonic_forms
 from ..maps.result import MapResult
@@ -25,7 +27,7 @@ from .torus import conformal_torus, tube_angle
 __all__ = ["ConformalMap", "conformal_map"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ConformalMap(MapResult):
     """A discrete conformal map to a flat torus, and from there to a torus of revolution.
 
@@ -76,7 +78,7 @@ class ConformalMap(MapResult):
     aspect: float
     skew: float
     conformal_energy: float
-    weights: str
+    weights: Weights
     chart_areas: NDArray[np.float64] = field(repr=False)
     torus: Torus = field()
     angles: NDArray[np.float64] = field(repr=False)
@@ -106,8 +108,14 @@ class ConformalMap(MapResult):
         }
 
 
+@takes_threads
 def conformal_map(
-    surface: TriMesh, basis: HomologyBasis | None = None, *, weights: str = "auto"
+    surface: TriMesh,
+    *,
+    basis: HomologyBasis | None = None,
+    weights: Literal["auto"] | Weights = "auto",
+    threads: int | None = None,
+    progress: Progress | None = None,
 ) -> ConformalMap:
     """Map a genus-one surface conformally onto a flat torus and a torus of revolution.
 
@@ -120,6 +128,10 @@ def conformal_map(
     weights : {"auto", "cotangent", "intrinsic_delaunay", "clamped"}
         Weights of the harmonic forms, see `HarmonicForms`. ``"auto"`` takes the first of the three
         whose chart has no fold; the last cannot fold but for rounding, the result says which it is.
+    threads : int, optional
+        Threads to use, see `threads`; the result does not depend on it.
+    progress : Progress, optional
+        Called once per choice of weights tried.
 
     Returns
     -------
@@ -143,7 +155,8 @@ def conformal_map(
         basis = homology_basis(surface)
     basis.require_torus()
     middle = perf_counter()
-    harmonic, forms, areas = _chart(surface, basis, WEIGHTS if weights == "auto" else (weights,))
+    choices = WEIGHTS if weights == "auto" else (weights,)
+    harmonic, forms, areas = _chart(surface, basis, choices, progress)
     cotangent = _core.forms.cotangent_weights(surface.topology, surface.V)
     gram = (forms * cotangent) @ forms.T
     aspect = math.sqrt(gram[1, 1] / gram[0, 0])
@@ -174,17 +187,22 @@ def conformal_map(
 
 
 def _chart(
-    surface: TriMesh, basis: HomologyBasis, choices: tuple[str, ...]
+    surface: TriMesh,
+    basis: HomologyBasis,
+    choices: tuple[Weights, ...],
+    progress: Progress | None,
 ) -> tuple[HarmonicForms, NDArray[np.float64], NDArray[np.float64]]:
     """First of the weights without a fold, else the one with fewest: forms (2, e), areas (m,)."""
-    best = None
-    for weights in choices:
+    fewest, best = math.inf, None
+    for done, weights in enumerate(choices, 1):
         harmonic = harmonic_forms(surface, basis, weights=weights)
         forms = basis.torus_matrix @ harmonic.forms
         areas = _core.forms.chart_areas(surface.topology, forms[0], forms[1])
         folds = int((areas <= 0.0).sum())
-        if best is None or folds < best[0]:
-            best = (folds, harmonic, forms, areas)
+        report(progress, "conformal", done, len(choices), folds=folds)
+        if best is None or folds < fewest:
+            fewest, best = folds, (harmonic, forms, areas)
         if folds == 0:
             break
-    return best[1:]
+    assert best is not None, "there is a choice of weights"
+    return best

@@ -6,7 +6,7 @@ A 1-form is one number per edge of the surface, along the edge from its lower to
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ from ..errors import OptionError
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["HarmonicForms"]
+__all__ = ["HarmonicForms", "Weights"]
 
-WEIGHTS = ("cotangent", "intrinsic_delaunay", "clamped")
+Weights = Literal["cotangent", "intrinsic_delaunay", "clamped"]
+WEIGHTS: tuple[Weights, ...] = get_args(Weights)
 CLAMP = 1e-2  # smallest clamped weight; the edge of an equilateral triangle pair has 0.577
 
 
@@ -49,13 +50,13 @@ class HarmonicForms:
     forms: NDArray[np.float64] = field(repr=False)
     potentials: NDArray[np.float64] = field(repr=False)
     gram: NDArray[np.float64]
-    weights: str
+    weights: Weights
     n_negative: int
     n_flips: int = 0
 
 
 def solve_harmonic(
-    surface: TriMesh, eta: NDArray[np.int32], weights: str = "cotangent"
+    surface: TriMesh, eta: NDArray[np.int32], weights: Weights = "cotangent"
 ) -> HarmonicForms:
     """Harmonic forms cohomologous to the rows of ``eta (k, e) int32``, see `harmonic_forms`."""
     if weights not in WEIGHTS:
@@ -66,12 +67,14 @@ def solve_harmonic(
     if weights == "intrinsic_delaunay":
         lengths = _core.mesh.edge_lengths(top, surface.V)
         edges, values, carried, n_flips = _core.forms.intrinsic_delaunay(top, lengths, eta)
-        _, potentials, gram = _core.forms.harmonic_forms(n, edges, values, carried)
+        _, potentials, gram = _core.forms.harmonic_forms(n, edges, values, carried.astype(float))
         forms = eta + np.diff(potentials[top.edges], axis=1)[:, 0].T
     else:
         if weights == "clamped":
             values = np.maximum(values, CLAMP)
-        forms, potentials, gram = _core.forms.harmonic_forms(n, top.edges, values, eta)
+        forms, potentials, gram = _core.forms.harmonic_forms(
+            n, top.edges, values, eta.astype(float)
+        )
     return HarmonicForms(
         forms=read_only(forms),
         potentials=read_only(potentials),

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..base.arrays import as_integers, read_only
 from ..base.files import atomic_path
-from ..base.tables import table
+from ..base.tables import HasSummary, table
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms, solve_harmonic
 from ..io.npz import save_npz
@@ -38,7 +38,7 @@ logger = logging.getLogger("stretchmap")
 
 
 @dataclass(frozen=True, eq=False)
-class HomologyBasis:
+class HomologyBasis(HasSummary):
     """Generators of the first homology of a closed surface and what the embedding says of them.
 
     A loop is an array of vertex ids, the first not repeated at the end. A class is an integer row
@@ -64,14 +64,14 @@ class HomologyBasis:
         where ``linking`` is.
     harmonic : HarmonicForms
         Harmonic representatives of ``dual_forms`` in cotangent weights.
-    torus_classes : ndarray, shape (2, 2), int64, or None
+    torus_classes : ndarray, shape (2, 2), int64
         Genus one only: classes of the longitude (row 0) and of the meridian (row 1). Of the
         longitudes, which differ by meridians, the one that makes the flat torus least skew.
-    torus_matrix : ndarray, shape (2, 2), int64, or None
-        ``torus_forms = torus_matrix @ dual_forms``.
-    torus_forms : ndarray, shape (2, e), int32, or None
-        Row 0 has period 1 on the longitude and 0 on the meridian, row 1 the other way round; the
-        integral of row 0 wedge row 1 over the outward surface is +1.
+    torus_matrix : ndarray, shape (2, 2), int64
+        Genus one only: ``torus_forms = torus_matrix @ dual_forms``.
+    torus_forms : ndarray, shape (2, e), int32
+        Genus one only: row 0 has period 1 on the longitude and 0 on the meridian, row 1 the other
+        way round; the integral of row 0 wedge row 1 over the outward surface is +1.
     """
 
     surface: TriMesh = field(repr=False)
@@ -83,9 +83,33 @@ class HomologyBasis:
     handle_classes: NDArray[np.int64]
     tunnel_classes: NDArray[np.int64] | None
     harmonic: HarmonicForms = field(repr=False)
-    torus_classes: NDArray[np.int64] | None
-    torus_matrix: NDArray[np.int64] | None
-    torus_forms: NDArray[np.int32] | None = field(repr=False)
+    _torus_classes: NDArray[np.int64] | None = None
+
+    @property
+    def torus_classes(self) -> NDArray[np.int64]:
+        """(2, 2) classes of the longitude and of the meridian, over ``generators``.
+
+        Raises
+        ------
+        GenusError
+            The genus is not one.
+        """
+        if self._torus_classes is None:
+            raise GenusError(
+                f"a torus map needs a surface of genus 1, this one has genus {self.genus}; loops "
+                "and holomorphic forms work for any genus"
+            )
+        return self._torus_classes
+
+    @cached_property
+    def torus_matrix(self) -> NDArray[np.int64]:
+        """(2, 2), ``torus_forms = torus_matrix @ dual_forms``; raises as `torus_classes`."""
+        return integer_inverse(self.torus_classes.T)
+
+    @cached_property
+    def torus_forms(self) -> NDArray[np.int32]:
+        """(2, e) forms dual to longitude and meridian; raises as `torus_classes`."""
+        return read_only((self.torus_matrix @ self.dual_forms).astype(np.int32))
 
     @cached_property
     def handle_loops(self) -> tuple[NDArray[np.int32], ...]:
@@ -128,8 +152,8 @@ class HomologyBasis:
         GenusError
             The genus is not one.
         """
-        self.require_torus()
-        if np.array_equal(self.torus_classes[:1], self.tunnel_classes):
+        tunnel = self.tunnel_classes
+        if tunnel is not None and np.array_equal(self.torus_classes[:1], tunnel):
             return self.tunnel_loops[0]
         return self._shortest_loop(self.torus_classes[0], self.handle_loops)
 
@@ -167,9 +191,9 @@ class HomologyBasis:
         top = self.surface.topology
         lengths = _core.mesh.edge_lengths(top, self.surface.V)
         crossing = [
-            loop
+            loop.tolist()
             for loop in (*known, *self.generators)
-            if _core.homology.periods(top, self.dual_forms, loop) @ self.intersection @ target
+            if self.classes(loop) @ self.intersection @ target
         ]
         loop = _core.homology.shortest_loop(
             top, lengths, self.dual_forms, target.astype(np.int32), min(crossing, key=len)
@@ -197,7 +221,7 @@ class HomologyBasis:
         IndexRangeError
             No vertex of the surface; ``ids`` are the places in the loop.
         """
-        ids = self._vertices(loop).astype(np.int32)
+        ids = self._vertices(loop).tolist()
         return _core.homology.periods(self.surface.topology, self.dual_forms, ids).astype(np.int64)
 
     def _vertices(self, loop: ArrayLike) -> NDArray[np.int64]:
@@ -211,11 +235,7 @@ class HomologyBasis:
         GenusError
             If it is not.
         """
-        if self.genus != 1:
-            raise GenusError(
-                f"a torus map needs a surface of genus 1, this one has genus {self.genus}; loops "
-                "and holomorphic forms work for any genus"
-            )
+        _ = self.torus_classes
 
     def to_dict(self) -> dict[str, Any]:
         """Genus and loop lengths, JSON-compatible."""
@@ -255,14 +275,15 @@ class HomologyBasis:
         OSError
             If the file cannot be written.
         """
-        arrays = {"V": self.surface.V, "F": self.surface.F, "edges": self.surface.edges}
+        surface = self.surface
+        arrays: dict[str, NDArray[Any]] = {"V": surface.V, "F": surface.F, "edges": surface.edges}
         arrays["dual_forms"] = self.dual_forms
         families = {"generator": self.generators, "handle": self.handle_loops}
         if self.tunnel_classes is not None:
             families["tunnel"] = self.tunnel_loops
         for name, loops in families.items():
             arrays.update({f"{name}_{i}": loop for i, loop in enumerate(loops)})
-        if self.torus_forms is not None:
+        if self.genus == 1:
             arrays.update(meridian=self.meridian, longitude=self.longitude)
             arrays["torus_forms"] = self.torus_forms
         with atomic_path(path) as temporary, open(temporary, "wb") as file:
@@ -313,6 +334,8 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
     harmonic = solve_harmonic(surface, forms)
 
     within = None if solid is None else bounding_in(solid, surface, loops)
+    linking: NDArray[np.int64] | None
+    tunnel: NDArray[np.int64] | None
     try:
         linking, inside, tunnel = bounding_by_linking(surface, loops, intersection)
         if within is not None and not same_lattice(inside, within):
@@ -328,12 +351,10 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
     if tunnel is not None:
         tunnel = integer_inverse(tunnel @ intersection @ handle.T) @ tunnel
 
-    classes = matrix = torus_forms = None
+    classes = None
     if len(handle) == 1:
         longitude = least_skew_longitude(handle[0], tunnel, intersection, harmonic.gram)
         classes = np.stack([longitude, handle[0]])
-        matrix = integer_inverse(classes.T)
-        torus_forms = read_only((matrix @ forms).astype(np.int32))
     return HomologyBasis(
         surface=surface,
         genus=len(handle),
@@ -344,7 +365,5 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
         handle_classes=handle,
         tunnel_classes=tunnel,
         harmonic=harmonic,
-        torus_classes=classes,
-        torus_matrix=matrix,
-        torus_forms=torus_forms,
+        _torus_classes=classes,
     )

@@ -27,7 +27,9 @@ def bounding_by_linking(
     surface lk(a, b outward) - lk(b, a outward) is minus the intersection number of a and b, each
     kind of class has rank g, and the two kinds meet in a unimodular matrix.
     """
-    linking = _core.homology.linking_matrix(surface.topology, surface.V, loops)
+    linking = _core.homology.linking_matrix(
+        surface.topology, surface.V, [loop.tolist() for loop in loops]
+    )
     inside, outside = integer_kernel(linking.T), integer_kernel(linking)
     if not (
         2 * len(inside) == 2 * len(outside) == len(loops)
@@ -47,8 +49,9 @@ def bounding_in(
     """Basis of the classes over ``loops`` on which every class of H^1(solid) vanishes."""
     fault = "the surface is not the boundary of the solid"
     require_same_mesh(solid.surface, surface, fault, "pass solid.surface")
+    within = [solid.boundary_vertices[loop].tolist() for loop in loops]
     relations, values = _core.homology.solid_cohomology(
-        solid.T, solid.edges, solid.n_vertices, [solid.boundary_vertices[loop] for loop in loops]
+        solid.T, solid.edges, solid.n_vertices, within
     )
     cohomology = integer_kernel(relations)
     if 2 * len(cohomology) != len(loops):
@@ -61,7 +64,8 @@ def bounding_in(
 
 def same_lattice(first: NDArray[np.int64], second: NDArray[np.int64]) -> bool:
     """Whether two gapless lattices of equal dimension are the same."""
-    return np.linalg.matrix_rank(np.vstack([first, second])) == len(first) == len(second)
+    rank = int(np.linalg.matrix_rank(np.vstack([first, second])))
+    return rank == len(first) == len(second)
 
 
 def least_skew_longitude(
@@ -78,4 +82,4 @@ def least_skew_longitude(
     longitude = complement(meridian) * intersection[0, 1] if tunnel is None else tunnel[0]
     forms = integer_inverse(np.stack([longitude, meridian]).T)
     g = forms @ gram @ forms.T
-    return longitude + round(g[0, 1] / g[0, 0]) * meridian
+    return np.asarray(longitude + round(g[0, 1] / g[0, 0]) * meridian)

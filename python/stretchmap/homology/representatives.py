@@ -12,14 +12,14 @@ from ..base.arrays import read_only
 if TYPE_CHECKING:
     from ..homology.basis import HomologyBasis
     from ..mesh.meshes import TriMesh
-from ..forms.harmonic import HarmonicForms, solve_harmonic
+from ..forms.harmonic import HarmonicForms, Weights, solve_harmonic
 from ..forms.holomorphic import HolomorphicForms
 
 __all__ = ["harmonic_forms", "holomorphic_forms"]
 
 
 def harmonic_forms(
-    surface: TriMesh, basis: HomologyBasis | None = None, *, weights: str = "cotangent"
+    surface: TriMesh, basis: HomologyBasis | None = None, *, weights: Weights = "cotangent"
 ) -> HarmonicForms:
     """Harmonic 1-forms dual to the homology generators, (3.2)-(3.5).
 

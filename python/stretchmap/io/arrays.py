@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..errors import FileFormatError
+from ..errors import ArrayError, FileFormatError
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +42,67 @@ class MeshArrays:
     extra: dict[str, NDArray[Any]] = field(default_factory=dict)
     corner_uv: NDArray[np.float64] | None = None
 
+    @property
+    def elements(self) -> NDArray[Any]:
+        """Tets where there are any, else triangles.
+
+        Raises
+        ------
+        ArrayError
+            There are neither.
+        """
+        found = self.F if self.T is None else self.T
+        if found is None:
+            raise ArrayError("neither triangles nor tets are given")
+        return found
+
+
+def checked(data: Mapping[str, ArrayLike] | None, rows: int, what: str) -> dict[str, NDArray[Any]]:
+    """Point or cell data as arrays of numbers with so many rows.
+
+    Raises
+    ------
+    ArrayError
+        They are not.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    for name, values in (data or {}).items():
+        array = np.asarray(values)
+        if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or len(array) != rows:
+            raise ArrayError(
+                f"{what}[{name!r}] must be numeric with {rows} rows, not {array.dtype} of shape "
+                f"{array.shape}"
+            )
+        arrays[name] = array
+    return arrays
+
+
+def checked_uv(
+    corner_uv: ArrayLike | None, suffix: str, faces: NDArray[np.int32]
+) -> NDArray[np.float64] | None:
+    """Texture coordinates of the corners of faces, or None.
+
+    Raises
+    ------
+    FileFormatError
+        The format has none.
+    ArrayError
+        Not (m, 3, 2) finite numbers.
+    """
+    if corner_uv is None:
+        return None
+    if suffix != ".obj":
+        raise FileFormatError(f"{suffix} files hold no texture coordinates; write an .obj")
+    uv = np.asarray(corner_uv, dtype=np.float64)
+    if uv.shape != (len(faces), 3, 2):
+        raise ArrayError(f"corner_uv must have shape ({len(faces)}, 3, 2), not {uv.shape}")
+    if not np.isfinite(uv).all():
+        raise ArrayError("corner_uv holds NaN or infinite values")
+    return uv
+
 
 def triangles_only(sizes: NDArray[Any]) -> None:
+    """Raise `FileFormatError` unless all faces have three corners."""
     odd = np.unique(sizes[sizes != 3])
     if len(odd):
         raise FileFormatError(

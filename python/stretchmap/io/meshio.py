@@ -82,12 +82,12 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
 def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
     """Write a mesh in one of meshio's formats."""
     meshio = _import(f"writing {path.suffix} files")
-    kind, cells = ("triangle", mesh.F) if mesh.T is None else ("tetra", mesh.T)
+    kind = "triangle" if mesh.T is None else "tetra"
     options: dict[str, Any] = {"data_format": "XML"} if file_format == "xdmf" else {}
     with _guarded(path):
         out = meshio.Mesh(
             mesh.V,
-            [(kind, cells)],
+            [(kind, mesh.elements)],
             point_data={k: _plain(a) for k, a in mesh.point_data.items()},
             cell_data={k: [_plain(a)] for k, a in mesh.cell_data.items()},
         )

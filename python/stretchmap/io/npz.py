@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import IO, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["save_npz"]
+from ..errors import ArrayError, FileFormatError
+from .arrays import MeshArrays
 
+__all__ = ["read_npz", "save_npz", "write_npz"]
+
+_MESH_KEYS = ("V", "F", "T")
 _SLICE = 1 << 20  # bytes
 _LEVEL = 1  # coordinates hardly shrink, and indices about as much as at higher levels
 
@@ -46,3 +51,38 @@ def save_npz(file: BinaryIO, arrays: Mapping[str, NDArray[Any]]) -> None:
         for name, array in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(_Slices(member), np.asanyarray(array), allow_pickle=False)
+
+
+def read_npz(file: BinaryIO) -> MeshArrays:
+    """The mesh ``V`` with ``F`` or ``T`` and all other arrays of an archive."""
+    loaded = np.load(file, allow_pickle=False)
+    if not isinstance(loaded, np.lib.npyio.NpzFile):
+        raise FileFormatError("it holds a single array; V and F or T are needed")
+    with loaded as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    if "V" not in arrays or not {"F", "T"} & arrays.keys():
+        raise FileFormatError(
+            f"V and F or T are needed, it holds {', '.join(sorted(arrays)) or 'nothing'}"
+        )
+    mesh = MeshArrays(arrays["V"], arrays.get("F"), arrays.get("T"))
+    n, m = (len(a) if a.ndim else 0 for a in (mesh.V, mesh.elements))
+    point_data: dict[str, NDArray[Any]] = {}
+    cell_data: dict[str, NDArray[Any]] = {}
+    extra: dict[str, NDArray[Any]] = {}
+    for name, array in arrays.items():
+        if name in _MESH_KEYS:
+            continue
+        rows = len(array) if array.ndim else -1
+        target = point_data if rows == n else cell_data if rows == m else extra
+        target[name] = array
+    return replace(mesh, point_data=point_data, cell_data=cell_data, extra=extra)
+
+
+def write_npz(file: BinaryIO, mesh: MeshArrays) -> None:
+    """Write mesh and data as one archive."""
+    clash = mesh.point_data.keys() & mesh.cell_data.keys()
+    clash |= (mesh.point_data.keys() | mesh.cell_data.keys()) & {*_MESH_KEYS, "file"}
+    if clash:
+        raise ArrayError(f"an .npz file cannot hold two arrays named {', '.join(sorted(clash))}")
+    key = "F" if mesh.T is None else "T"
+    save_npz(file, {"V": mesh.V, key: mesh.elements, **mesh.point_data, **mesh.cell_data})

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from ..errors import FileFormatError
 from .arrays import MeshArrays
 
-# ------------------------------------------------------------------------------------------- OBJ
-
 _CORNER = rb"[ \t]+(-?\d+)(?:/(-?\d*))?(?:/-?\d*)?"
 _FACE = re.compile(rb"^[ \t]*f" + 3 * _CORNER + rb"[ \t]*(?:#.*)?\r?$", re.MULTILINE)
 _FACE_LINE = re.compile(rb"^[ \t]*f[ \t].*$", re.MULTILINE)
@@ -68,7 +66,7 @@ def _obj_ids(words: NDArray[np.bytes_], n: int, in_order: bool) -> NDArray[np.in
 
 def write_obj(file: BinaryIO, mesh: MeshArrays) -> None:
     """Write points, faces and, where given, texture coordinates, seams included."""
-    faces = mesh.F + 1
+    faces = mesh.elements + 1
     np.savetxt(file, mesh.V, fmt="v %.17g %.17g %.17g")
     if mesh.corner_uv is None:
         np.savetxt(file, faces, fmt="f %d %d %d")

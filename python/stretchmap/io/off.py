@@ -10,8 +10,6 @@ import numpy as np
 from ..errors import FileFormatError
 from .arrays import MeshArrays, triangles_only
 
-# ------------------------------------------------------------------------------------------- OFF
-
 
 def read_off(data: bytes) -> MeshArrays:
     """Parse an OFF file of triangles; normals and colors of the variants are skipped."""
@@ -36,6 +34,6 @@ def read_off(data: bytes) -> MeshArrays:
 
 def write_off(file: BinaryIO, mesh: MeshArrays) -> None:
     """Write points and faces."""
-    file.write(f"OFF\n{len(mesh.V)} {len(mesh.F)} 0\n".encode())
+    file.write(f"OFF\n{len(mesh.V)} {len(mesh.elements)} 0\n".encode())
     np.savetxt(file, mesh.V, fmt="%.17g %.17g %.17g")
-    np.savetxt(file, mesh.F, fmt="3 %d %d %d")
+    np.savetxt(file, mesh.elements, fmt="3 %d %d %d")

@@ -172,16 +172,18 @@ def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:
     cells = _columns(mesh.cell_data)
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.V)}"]
     lines += [f"property {_NAMES[a.dtype.str[1:]]} {name}" for name, a in points.items()]
-    lines += [f"element face {len(mesh.F)}", "property list uchar int vertex_indices"]
+    lines += [f"element face {len(mesh.elements)}", "property list uchar int vertex_indices"]
     lines += [f"property {_NAMES[a.dtype.str[1:]]} {name}" for name, a in cells.items()]
     file.write(("\n".join([*lines, "end_header"]) + "\n").encode("ascii"))
     vertex = np.empty(len(mesh.V), [(k, "<" + a.dtype.str[1:]) for k, a in points.items()])
     for name, column in points.items():
         vertex[name] = column
     layout = [("#", "u1"), ("vertex_indices", "<i4", 3)]
-    face = np.empty(len(mesh.F), layout + [(k, "<" + a.dtype.str[1:]) for k, a in cells.items()])
+    face = np.empty(
+        len(mesh.elements), layout + [(k, "<" + a.dtype.str[1:]) for k, a in cells.items()]
+    )
     face["#"] = 3
-    face["vertex_indices"] = mesh.F
+    face["vertex_indices"] = mesh.elements
     for name, column in cells.items():
         face[name] = column
     file.write(vertex.tobytes())

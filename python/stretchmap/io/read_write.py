@@ -24,23 +24,23 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..base.files import atomic_path
-from ..errors import ArrayError, FileFormatError, StretchmapError
+from ..errors import FileFormatError, StretchmapError
+from ..mesh.given import as_solid, as_surface
 from ..mesh.meshes import TetMesh, TriMesh
-from .arrays import MeshArrays
+from .arrays import MeshArrays, checked, checked_uv
 from .meshio import read_meshio, write_meshio
-from .npz import save_npz
+from .npz import read_npz, write_npz
 from .obj import read_obj, write_obj
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .stl import read_stl, write_stl
 
-__all__ = ["MeshArrays", "read", "read_arrays", "suffixes", "write"]
+__all__ = ["read", "read_arrays", "read_solid", "read_surface", "suffixes", "write"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -59,7 +59,6 @@ _WRITERS: dict[str, Callable[[BinaryIO, MeshArrays], None]] = {
 # Suffix -> meshio's name of the format.
 _MESHIO = {".msh": "gmsh", ".vtu": "vtu", ".vtk": "vtk", ".mesh": "medit", ".xdmf": "xdmf"}
 _WITHOUT_DATA = {".obj", ".off", ".stl", ".mesh"}
-_MESH_KEYS = ("V", "F", "T")
 
 
 def suffixes(solid: bool) -> tuple[str, ...]:
@@ -100,12 +99,39 @@ def read(
         The file cannot be opened.
     """
     arrays = read_arrays(path)
-    mesh: TriMesh | TetMesh
-    if arrays.T is not None:
-        mesh = TetMesh(arrays.V, arrays.T, orient=orient)
-    else:
-        mesh = TriMesh(arrays.V, arrays.F, orient=orient)  # type: ignore[arg-type]
+    make = TriMesh if arrays.T is None else TetMesh
+    mesh: TriMesh | TetMesh = make(arrays.V, arrays.elements, orient=orient)
     return mesh.compact()[0] if compact else mesh
+
+
+def read_surface(
+    path: str | os.PathLike[str], *, orient: bool = False, compact: bool = False
+) -> TriMesh:
+    """Read a triangle mesh: `read`, where nothing else will do.
+
+    Raises
+    ------
+    KindError
+        The file holds a solid.
+    FileFormatError, MissingDependencyError, MeshError, OSError
+        As `read`.
+    """
+    return as_surface(read(path, orient=orient, compact=compact), str(path))
+
+
+def read_solid(
+    path: str | os.PathLike[str], *, orient: bool = False, compact: bool = False
+) -> TetMesh:
+    """Read a tet mesh: `read`, where nothing else will do.
+
+    Raises
+    ------
+    KindError
+        The file holds a surface.
+    FileFormatError, MissingDependencyError, MeshError, OSError
+        As `read`.
+    """
+    return as_solid(read(path, orient=orient, compact=compact), str(path))
 
 
 def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
@@ -135,7 +161,7 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
             if suffix in _READERS:
                 return _READERS[suffix](file.read())
             if suffix == ".npz":
-                return _read_npz(file)
+                return read_npz(file)
     with _parsing(path):
         return read_meshio(path, _MESHIO[suffix])
 
@@ -186,9 +212,9 @@ def write(
         mesh.V,
         F=None if solid else elements,
         T=elements if solid else None,
-        point_data=_checked(point_data, len(mesh.V), "point_data"),
-        cell_data=_checked(cell_data, len(elements), "cell_data"),
-        corner_uv=_checked_uv(corner_uv, suffix, elements),
+        point_data=checked(point_data, len(mesh.V), "point_data"),
+        cell_data=checked(cell_data, len(elements), "cell_data"),
+        corner_uv=checked_uv(corner_uv, suffix, elements),
     )
     if suffix in _WITHOUT_DATA and (arrays.point_data or arrays.cell_data):
         names = [*arrays.point_data, *arrays.cell_data]
@@ -203,7 +229,7 @@ def write(
         else:
             with open(temporary, "wb") as file:
                 if suffix == ".npz":
-                    _write_npz(file, arrays)
+                    write_npz(file, arrays)
                 else:
                     _WRITERS[suffix](file, arrays)
 
@@ -230,64 +256,3 @@ def _parsing(path: Path) -> Iterator[None]:
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(f"{path} is damaged or not what its name says: {reason}") from error
-
-
-def _read_npz(file: BinaryIO) -> MeshArrays:
-    loaded = np.load(file, allow_pickle=False)
-    if not isinstance(loaded, np.lib.npyio.NpzFile):
-        raise FileFormatError("it holds a single array; V and F or T are needed")
-    with loaded as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    if "V" not in arrays or not {"F", "T"} & arrays.keys():
-        raise FileFormatError(
-            f"V and F or T are needed, it holds {', '.join(sorted(arrays)) or 'nothing'}"
-        )
-    V, F, T = (arrays.get(name) for name in _MESH_KEYS)
-    n, m = (len(a) if a.ndim else 0 for a in (V, F if T is None else T))
-    point_data: dict[str, NDArray[Any]] = {}
-    cell_data: dict[str, NDArray[Any]] = {}
-    extra: dict[str, NDArray[Any]] = {}
-    for name, array in arrays.items():
-        if name in _MESH_KEYS:
-            continue
-        rows = len(array) if array.ndim else -1
-        target = point_data if rows == n else cell_data if rows == m else extra
-        target[name] = array
-    return MeshArrays(V, F, T, point_data, cell_data, extra)
-
-
-def _write_npz(file: BinaryIO, mesh: MeshArrays) -> None:
-    clash = mesh.point_data.keys() & mesh.cell_data.keys()
-    clash |= (mesh.point_data.keys() | mesh.cell_data.keys()) & {*_MESH_KEYS, "file"}
-    if clash:
-        raise ArrayError(f"an .npz file cannot hold two arrays named {', '.join(sorted(clash))}")
-    elements = {"F": mesh.F} if mesh.T is None else {"T": mesh.T}
-    save_npz(file, {"V": mesh.V, **elements, **mesh.point_data, **mesh.cell_data})
-
-
-def _checked(data: Mapping[str, ArrayLike] | None, rows: int, what: str) -> dict[str, NDArray[Any]]:
-    checked: dict[str, NDArray[Any]] = {}
-    for name, values in (data or {}).items():
-        array = np.asarray(values)
-        if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or len(array) != rows:
-            raise ArrayError(
-                f"{what}[{name!r}] must be numeric with {rows} rows, not {array.dtype} of shape "
-                f"{array.shape}"
-            )
-        checked[name] = array
-    return checked
-
-
-def _checked_uv(
-    corner_uv: ArrayLike | None, suffix: str, faces: NDArray[np.int32]
-) -> NDArray[np.float64] | None:
-    if corner_uv is None:
-        return None
-    if suffix != ".obj":
-        raise FileFormatError(f"{suffix} files hold no texture coordinates; write an .obj")
-    uv = np.asarray(corner_uv, dtype=np.float64)
-    if uv.shape != (len(faces), 3, 2):
-        raise ArrayError(f"corner_uv must have shape ({len(faces)}, 3, 2), not {uv.shape}")
-    if not np.isfinite(uv).all():
-        raise ArrayError("corner_uv holds NaN or infinite values")
-    return uv

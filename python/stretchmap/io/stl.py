@@ -10,8 +10,6 @@ import numpy as np
 from ..errors import FileFormatError
 from .arrays import MeshArrays
 
-# ------------------------------------------------------------------------------------------- STL
-
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -37,9 +35,10 @@ def read_stl(data: bytes) -> MeshArrays:
 
 def write_stl(file: BinaryIO, mesh: MeshArrays) -> None:
     """Write a binary STL; coordinates are rounded to single precision."""
-    facets = np.zeros(len(mesh.F), _FACET)
-    facets["corners"] = mesh.V[mesh.F]
-    a, b, c = np.moveaxis(mesh.V[mesh.F], 1, 0)
+    corners = mesh.V[mesh.elements]
+    facets = np.zeros(len(corners), _FACET)
+    facets["corners"] = corners
+    a, b, c = np.moveaxis(corners, 1, 0)
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     facets["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)

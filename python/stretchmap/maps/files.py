@@ -22,7 +22,7 @@ from .result import MapResult
 __all__ = ["LoadedMap", "load_map"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class LoadedMap(MapResult):
     """A map read back from a file, whoever wrote it.
 
@@ -136,16 +136,15 @@ def _read_meta(path: object, meta: NDArray[Any] | None) -> dict[str, Any]:
 _NAMES_OF_0_1 = {"ring_sd": "ring_std", "element_sd": "element_std"}
 
 
-def _renamed(record: dict[str, Any]) -> dict[str, Any]:
-    return {_NAMES_OF_0_1.get(name, name): value for name, value in record.items()}
-
-
 def _read_history(path: object, records: Any) -> tuple[IterationRecord, ...]:
     names = [f.name for f in dataclasses.fields(IterationRecord)]
+
+    def restored(record: dict[str, Any]) -> IterationRecord:
+        values = {_NAMES_OF_0_1.get(name, name): value for name, value in record.items()}
+        values = {name: NAN if values[name] is None else values[name] for name in names}
+        return IterationRecord(**values)
+
     try:
-        return tuple(
-            IterationRecord(**{k: NAN if record[k] is None else record[k] for k in names})
-            for record in map(_renamed, records)
-        )
+        return tuple(restored(record) for record in records)
     except (TypeError, KeyError, AttributeError) as error:
         raise FileFormatError(f"{path}: the history in meta cannot be read: {error!r}") from None

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import io
 from ..base.arrays import read_only
 from ..base.files import atomic_path
-from ..base.tables import plain, table, versions
+from ..base.tables import HasSummary, plain_dict, table, versions
 from ..base.torus import TWO_PI, Torus
 from ..errors import OptionError
 from ..io.npz import save_npz
@@ -32,11 +32,14 @@ from ..mesh.meshes import TetMesh, TriMesh
 from .history import IterationRecord
 from .points import PointMap
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 __all__ = ["MapResult"]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class MapResult:
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class MapResult(HasSummary):
     """A piecewise-affine map, given by the image of each vertex.
 
     Attributes
@@ -75,6 +78,36 @@ class MapResult:
     def title(self) -> str:
         """What kind of map this is."""
         return self._title
+
+    def __repr__(self) -> str:
+        size = f"{len(elements(self.mesh))} {'tets' if isinstance(self.mesh, TetMesh) else 'faces'}"
+        state = "converged" if self.converged else "not converged"
+        return f"{type(self).__name__}({size}, {state})"
+
+    def plot(self, kind: str, **options: Any) -> Figure:
+        """Picture of the map.
+
+        Parameters
+        ----------
+        kind : str
+            One of ``stretchmap.plot.kinds(result)``: ``"levels"``, ``"checkerboard"``, ...
+        **options
+            Those of the function of that name in ``stretchmap.plot``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        OptionError
+            Unknown kind, or an option it does not have.
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        import stretchmap  # the front door loads pictures when they are asked for
+
+        return stretchmap.plot.picture(self, kind, **options)
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """Further arrays to be kept in a map file, by name."""
@@ -187,7 +220,7 @@ class MapResult:
         }
         if history:
             out["history"] = [dataclasses.asdict(record) for record in self.history]
-        return plain(out)
+        return plain_dict(out)
 
     def to_json(self, history: bool = False, indent: int | None = 2) -> str:
         """:meth:`to_dict` as JSON text; what is not finite becomes ``null``."""

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..base.arrays import as_reals, read_only
 from ..base.options import instance
-from ..base.tables import plain, table
+from ..base.tables import HasSummary, plain_dict, table
 from ..base.torus import Torus
 from ..errors import DegenerateError, OptionError, OrientationError
 from ..mesh.given import as_mesh
@@ -27,7 +27,7 @@ __all__ = ["Distortion", "distortion"]
 
 
 @dataclass(frozen=True, eq=False)
-class Distortion:
+class Distortion(HasSummary):
     """How far a piecewise-affine map is from preserving area or volume.
 
     Sizes are areas for a surface and volumes for a solid, normalised by their totals, so that a
@@ -98,7 +98,7 @@ class Distortion:
     def to_dict(self) -> dict[str, float | int | None]:
         """The scalars, JSON-compatible."""
         arrays = ("ratios", "ring_ratios", "angles", "flipped")
-        return plain({k: v for k, v in self.__dict__.items() if k not in arrays})
+        return plain_dict({k: v for k, v in self.__dict__.items() if k not in arrays})
 
     def summary(self) -> str:
         """A table of the scalars."""

@@ -21,7 +21,9 @@ def outward_areas(
     torus : Torus
     """
     u, v, _ = torus.coordinates(image[faces].mean(axis=1))
-    return np.einsum("ij,ij->i", torus.normal(u, v), _core.mesh.face_area_vectors(image, faces))
+    vectors = _core.mesh.face_area_vectors(image, faces)
+    areas: NDArray[np.float64] = np.einsum("ij,ij->i", torus.normal(u, v), vectors)
+    return areas
 
 
 def chart_areas(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:

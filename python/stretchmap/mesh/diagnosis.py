@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import describe, read_only
+from ..base.tables import HasSummary
 from ..errors import ConnectivityError, GenusError
 from .defects import WORDINGS, Defect
 
@@ -23,7 +24,7 @@ def _none(*shape: int) -> Ids:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
+class Diagnosis(HasSummary):
     """Every defect of a mesh. ``defects`` lists those found, ``summary()`` puts them into words.
 
     Elements are faces of a surface and tets of a solid. Elements that repeat a vertex and second

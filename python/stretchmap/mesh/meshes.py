@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from ..base.arrays import as_indices, as_points, read_only
+from ..base.tables import html, table
 from .diagnosis import Diagnosis, diagnose_solid, diagnose_surface
 
 __all__ = ["TetMesh", "TriMesh"]
@@ -42,6 +43,12 @@ class _Mesh:
     def n_vertices(self) -> int:
         """Number of rows of ``V``."""
         return len(self.V)
+
+    def _repr_html_(self) -> str:
+        name, _, counts = repr(self).rstrip(")").partition("(")
+        low, high = self.V.min(axis=0), self.V.max(axis=0)
+        box = [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)]
+        return html(table({name: counts, "bounding box": " x ".join(box)}))
 
 
 class TriMesh(_Mesh):
@@ -370,7 +377,7 @@ class TetMesh(_Mesh):
 
 def _compacted(elements: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     kept, inverse = np.unique(elements, return_inverse=True)
-    return read_only(kept), inverse.reshape(elements.shape)
+    return read_only(kept), inverse.reshape(elements.shape).astype(np.int32)
 
 
 def _turned(elements: NDArray[np.int32], ids: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -45,7 +45,8 @@ def split_edges(solid: TetMesh, edges: NDArray[np.int32], shares: NDArray[np.flo
     n = solid.n_vertices
 
     def keys(pairs: NDArray[np.int32]) -> NDArray[np.int64]:
-        return pairs.min(axis=-1) * np.int64(n) + pairs.max(axis=-1)
+        low: NDArray[np.int64] = pairs.min(axis=-1).astype(np.int64)
+        return np.asarray(low * n + pairs.max(axis=-1))
 
     wanted = keys(edges)
     order = np.argsort(wanted)

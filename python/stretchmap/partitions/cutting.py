@@ -116,10 +116,12 @@ class Pieces:
         """Part of each tet between levels along which all are cut already."""
         # The function is linear on a piece and has one sign in it, so its centroid tells the part.
         if axis == "s":
-            return np.searchsorted(cuts, self.points[self.T, 7].mean(axis=1))
-        a, b = (values[self.T].mean(axis=1) for values in self.angle_pair(axis))
-        turned = (np.arctan2(b, a) - cuts[0]) % TWO_PI
-        return np.searchsorted(cuts[1:] - cuts[0], turned)
+            places = np.searchsorted(cuts, self.points[self.T, 7].mean(axis=1))
+        else:
+            a, b = (values[self.T].mean(axis=1) for values in self.angle_pair(axis))
+            turned = (np.arctan2(b, a) - cuts[0]) % TWO_PI
+            places = np.searchsorted(cuts[1:] - cuts[0], turned)
+        return np.asarray(places, np.intp)
 
 
 def cut_all(
@@ -138,5 +140,6 @@ def cut_all(
 def part_volumes(
     pieces: Pieces, labels: NDArray[np.int32], shares: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
+    """Volume of every part in the source, (product of the numbers of shares,)."""
     count = math.prod(len(share) for share in shares)
-    return np.bincount(labels, pieces.volumes("source"), minlength=count)
+    return np.bincount(labels, pieces.volumes("source"), minlength=count).astype(float)

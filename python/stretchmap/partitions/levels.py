@@ -16,16 +16,23 @@ from .cutting import Pieces
 
 
 def shares_of(fractions: int | Sequence[float]) -> NDArray[np.float64]:
+    """Shares of the volume, summing to 1, from a number of equal ones or from the shares."""
     if isinstance(fractions, (int, np.integer)):
         if fractions < 2:
             raise OptionError(f"a partition has at least two parts, got {fractions}")
         return np.full(fractions, 1.0 / fractions)
-    shares = np.asarray(fractions, float)
+    shares = np.array(fractions, float)
     if shares.ndim != 1 or len(shares) < 2:
         raise OptionError("fractions must be a number of parts or one share for each of them")
     if not (np.isfinite(shares).all() and (shares > 0.0).all() and abs(shares.sum() - 1.0) < 1e-9):
         raise OptionError(f"fractions must be positive and sum to 1, got {shares.tolist()}")
-    return shares / shares.sum()
+    return np.asarray(shares / shares.sum())
+
+
+def _shell_volume(pieces: Pieces, of: str) -> Callable[[float], float]:
+    """Volume within the shell of a value of ``(s / r)^2``."""
+    volumes, values = pieces.volumes(of), pieces.points[:, 7]
+    return lambda level: _core.partitions.volume_below(pieces.T, volumes, values - level)
 
 
 def levels_of(
@@ -33,18 +40,13 @@ def levels_of(
 ) -> NDArray[np.float64]:
     """Levels that divide source or image as asked: p - 1 for s, p angles for u and v."""
     if axis == "s":
-        volumes = pieces.volumes(of)
+        below = _shell_volume(pieces, of)
         values = pieces.points[:, 7]
-
-        def below(level: float) -> float:
-            return _core.partitions.volume_below(pieces.T, volumes, values - level)
-
         ends = (float(values.min()), float(values.max()))
     else:
         below = _sector_volume(pieces, axis, start, of)
-        volumes = pieces.volumes(of)
         ends = (start, start + TWO_PI)
-    total = float(volumes.sum())
+    total = float(pieces.volumes(of).sum())
     found = [_root(below, share * total, ends) for share in np.cumsum(shares)[:-1]]
     return np.array(found if axis == "s" else [start, *found])
 

@@ -18,31 +18,32 @@ the first by itself, and so on, so that every cell of a grid has the volume aske
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
-from ..base.tables import plain, table
-from ..errors import ArrayError, OptionError
+from ..base.options import real
+from ..base.tables import HasSummary, plain_dict, table
+from ..errors import OptionError
+from ..maps.given import as_map_of_solid, torus_of
+from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh, TriMesh
 from .cutting import Pieces, cut_all, part_volumes
 from .levels import cut_nested, levels_of, shares_of
 
-if TYPE_CHECKING:
-    from ..maps.result import MapResult
+__all__ = ["Coordinate", "Partition", "partition"]
 
-__all__ = ["Partition", "partition"]
+Coordinate = Literal["s", "u", "v"]
 
 
 @dataclass(frozen=True, eq=False)
-class Partition:
+class Partition(HasSummary):
     """A solid cut into parts.
 
     Attributes
@@ -75,7 +76,7 @@ class Partition:
         several coordinates.
     """
 
-    by: tuple[str, ...]
+    by: tuple[Coordinate, ...]
     fractions: NDArray[np.float64]
     solid: TetMesh
     image: NDArray[np.float64]
@@ -121,7 +122,7 @@ class Partition:
     def _tets(self, i: int) -> NDArray[np.bool_]:
         if not 0 <= i < self.n_parts:
             raise OptionError(f"there are parts 0 to {self.n_parts - 1}, not {i}")
-        return self.labels == i
+        return np.asarray(self.labels == i)
 
     def _faces(self, i: int) -> NDArray[np.int64]:
         tets = np.ascontiguousarray(self.solid.T[self._tets(i)])
@@ -130,9 +131,8 @@ class Partition:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything scalar, JSON-compatible."""
-        names = ("by", "fractions", "levels", "volumes", "errors", "uncorrected_errors",
-                 "cumulative_errors")  # fmt: skip
-        return plain({name: getattr(self, name) for name in names})
+        names = "by fractions levels volumes errors uncorrected_errors cumulative_errors".split()
+        return plain_dict({name: getattr(self, name) for name in names})
 
     def summary(self) -> str:
         """A table of the parts."""
@@ -168,10 +168,25 @@ class Partition:
         )
 
 
+def _asked(
+    fractions: int | Sequence[float] | Sequence[int | Sequence[float]],
+    by: Coordinate | Sequence[Coordinate],
+) -> tuple[tuple[Coordinate, ...], list[NDArray[np.float64]]]:
+    """Coordinates and the shares along each."""
+    axes = (by,) if isinstance(by, str) else tuple(by)
+    if not axes or len(set(axes)) != len(axes) or not set(axes) <= set(get_args(Coordinate)):
+        raise OptionError(f"by must name each of 's', 'u', 'v' at most once, got {by!r}")
+    single = isinstance(by, str) or isinstance(fractions, int)
+    wanted: Any = (fractions,) if single else fractions
+    if len(wanted) != len(axes):
+        raise OptionError(f"{len(axes)} coordinates need as many fractions, got {len(wanted)}")
+    return axes, [shares_of(entry) for entry in wanted]
+
+
 def partition(
     result: MapResult,
-    fractions: int | Sequence[float] | tuple[int | Sequence[float], ...] = 5,
-    by: str | tuple[str, ...] = "s",
+    fractions: int | Sequence[float] | Sequence[int | Sequence[float]] = 5,
+    by: Coordinate | Sequence[Coordinate] = "s",
     *,
     start: float = 0.0,
     correct: bool = True,
@@ -180,7 +195,7 @@ def partition(
 
     Parameters
     ----------
-    result : VolumeMap or LoadedMap
+    result : VolumeMap, or LoadedMap of one
         Map of a solid onto the solid torus.
     fractions : int or sequence of float
         Number of equal parts, or the share of each, summing to 1. With several coordinates a tuple,
@@ -202,26 +217,15 @@ def partition(
     ------
     OptionError
         If an option is out of range or the map has no torus.
-    ArrayError
-        If the map is that of a surface.
+    KindError
+        If it is no map, or that of a surface.
     SolverError
         If the image has no volume to be divided.
     """
-    axes = (by,) if isinstance(by, str) else tuple(by)
-    wanted = (fractions,) if isinstance(by, str) else tuple(fractions)  # type: ignore[arg-type]
-    if not axes or len(set(axes)) != len(axes) or any(axis not in ("s", "u", "v") for axis in axes):
-        raise OptionError(f"by must name each of 's', 'u', 'v' at most once, got {by!r}")
-    if len(wanted) != len(axes):
-        raise OptionError(f"{len(axes)} coordinates need as many fractions, got {len(wanted)}")
-    if not math.isfinite(start):
-        raise OptionError(f"start must be finite, got {start}")
-    shares = [shares_of(entry) for entry in wanted]
-    if not hasattr(result.mesh, "T"):
-        raise ArrayError("only the map of a solid can be partitioned, this is that of a surface")
-    if result.torus is None:
-        raise OptionError("the map has no torus, so there are no coordinates on it")
-
-    pieces = Pieces.of(result.mesh, result.image, result.torus)
+    axes, shares = _asked(fractions, by)
+    start = real("start", start)
+    mapped, source = as_map_of_solid(result, "a partition")
+    pieces = Pieces.of(source, mapped.image, torus_of(mapped))
     uncorrected = [
         levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)
     ]
@@ -235,7 +239,7 @@ def partition(
     for share in shares:
         asked = np.multiply.outer(asked, share).ravel()
     volumes = np.bincount(labels, solid.tet_volumes, minlength=len(asked))
-    total = result.mesh.volume
+    total = source.volume
     running = np.cumsum(asked)[:-1]
     return Partition(
         by=axes,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .. import _core, io
 from ..base.arrays import read_only
 from ..base.files import atomic_path
-from ..base.tables import plain, table
+from ..base.tables import HasSummary, plain_dict, table
 from ..errors import FileFormatError, OptionError
 from ..mesh.meshes import TetMesh
 
@@ -26,7 +26,7 @@ __all__ = ["Morph", "morph"]
 
 
 @dataclass(frozen=True, eq=False)
-class Morph:
+class Morph(HasSummary):
     """The straight way of every vertex from source to image.
 
     Attributes
@@ -54,7 +54,7 @@ class Morph:
 
     def to_dict(self) -> dict[str, Any]:
         """The figures, JSON-compatible."""
-        return plain({"frames": len(self.times), "most_flips": int(self.flips.max())})
+        return plain_dict({"frames": len(self.times), "most_flips": int(self.flips.max())})
 
     def summary(self) -> str:
         """A table of the figures."""

@@ -43,7 +43,7 @@ _log = logging.getLogger("stretchmap")
 _WARM_STEPS, _WARM_C = 3, 10.0
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Registration(MapResult):
     """A map from one solid torus onto another.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import read_only
-from ..base.tables import plain, table
+from ..base.tables import HasSummary, plain_dict, table
 from .hex_files import write_hexahedra
 
 __all__ = ["HexMesh"]
@@ -20,7 +20,7 @@ _SHARES_BELOW = (0.2, 0.3, 0.5)
 
 
 @dataclass(frozen=True, eq=False)
-class HexMesh:
+class HexMesh(HasSummary):
     """A structured hexahedral mesh of a solid.
 
     Attributes
@@ -100,7 +100,7 @@ class HexMesh:
     def to_dict(self) -> dict[str, Any]:
         """The figures, JSON-compatible."""
         worst = self.scaled_jacobians
-        return plain(
+        return plain_dict(
             {
                 "n_points": len(self.V),
                 "n_hexahedra": len(self.H),

@@ -40,7 +40,7 @@ _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 _LARGE = 1_000_000
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class VolumeMap(MapResult):
     """A map of a solid onto the solid torus.
 

@@ -179,7 +179,7 @@ def test_energy_and_area_from_the_image(name, load_surface):
 def test_paper_route_gives_the_same_lattice(name, load_surface):
     surface = load_surface(name)
     basis = homology_basis(surface)
-    result = conformal_map(surface, basis)
+    result = conformal_map(surface, basis=basis)
     by_hodge = hodge_lattice(surface, basis)
     error = np.abs(by_hodge - result.lattice).max() / np.abs(result.lattice).max()
     assert error < 1.5 * result.conformal_energy
@@ -319,7 +319,7 @@ def test_clamped_weights_never_fold(seed):
         basis = homology_basis(jittered_torus(seed))
     except Exception as error:  # a jitter that makes the surface cross itself
         pytest.skip(str(error))
-    assert conformal_map(basis.surface, basis, weights="clamped").flips == 0
+    assert conformal_map(basis.surface, basis=basis, weights="clamped").flips == 0
 
 
 # ---------------------------------------------------------------- refusals and output

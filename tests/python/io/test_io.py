@@ -15,10 +15,11 @@ from stretchmap.errors import (
     ArrayError,
     FileFormatError,
     IndexRangeError,
+    KindError,
     MissingDependencyError,
     NonFiniteError,
 )
-from stretchmap.io import read, read_arrays, write
+from stretchmap.io import read, read_arrays, read_solid, read_surface, write
 from stretchmap.io.npz import save_npz
 from stretchmap.mesh.meshes import TetMesh, TriMesh
 
@@ -380,3 +381,15 @@ def test_compressed_files_are_read_by_numpy(tmp_path):
     with np.load(tmp_path / "a.npz") as loaded:
         assert loaded.files == ["a", "b"]
         assert all(np.array_equal(loaded[name], array) for name, array in arrays.items())
+
+
+def test_readers_of_one_kind(tmp_path, surface):
+    solid = TetMesh(*shapes.cubes(shapes.RING))
+    write(tmp_path / "solid.npz", solid)
+    write(tmp_path / "surface.npz", surface)
+    assert np.array_equal(read_solid(tmp_path / "solid.npz").T, solid.T)
+    assert np.array_equal(read_surface(tmp_path / "surface.npz").F, surface.F)
+    with pytest.raises(KindError, match=r"solid\.npz.*\.surface"):
+        read_surface(tmp_path / "solid.npz")
+    with pytest.raises(KindError, match=r"surface\.npz.*tetrahedralize"):
+        read_solid(tmp_path / "surface.npz")

@@ -1,0 +1,45 @@
+"""What notebooks and the interpreter show of results."""
+
+from __future__ import annotations
+
+import pytest
+
+import stretchmap as sm
+from stretchmap import samples
+from stretchmap.base.tables import html
+from stretchmap.errors import OptionError
+
+
+@pytest.fixture(scope="module")
+def result():
+    return sm.volume_map(samples.bumpy_torus(1500))
+
+
+def test_the_interpreter_shows_one_short_line(result):
+    shown = repr(result)
+    assert shown.startswith("VolumeMap(") and "tets" in shown and "converged" in shown
+    assert len(shown) < 100 and len(repr(sm.conformal_map(result.mesh.surface))) < 100
+
+
+def test_notebooks_show_tables(result):
+    parts = sm.partition(result, 3)
+    basis = sm.homology_basis(result.mesh.surface)
+    diagnosis = result.mesh.diagnose()
+    comparison = sm.compare(result.mesh, {"here": result})
+    everything = (result, result.distortion, result.certificate, parts, basis, diagnosis)
+    for item in (*everything, comparison, result.mesh, result.mesh.surface):
+        shown = item._repr_html_()
+        assert shown.startswith("<table>") and shown.endswith("</table>")
+        assert shown.count("<tr>") == shown.count("</tr>") >= 2
+    assert "<th>flips</th><td>0</td>" in result._repr_html_()
+
+
+def test_names_of_a_user_do_not_become_markup():
+    assert "<b>" not in html("<b>bold</b>  1")
+
+
+def test_a_map_draws_itself(result):
+    pytest.importorskip("matplotlib")
+    assert result.plot("ratios").axes
+    with pytest.raises(OptionError, match="unknown kind"):
+        result.plot("portrait")
