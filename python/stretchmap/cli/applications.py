@@ -6,7 +6,7 @@ import logging
 import math
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -167,8 +167,8 @@ def partition(
 
     common.check_outputs(output, suffixes(solid=True), json, map_file)
     loaded = _solid_map(map_file, "partition")
-    axes = tuple(name.strip() for name in by.split(","))
-    shares = tuple(_shares(entry) for entry in fractions.split(":"))
+    axes: Any = [name.strip() for name in by.split(",")]  # checked there
+    shares = [_shares(entry) for entry in fractions.split(":")]
     if len(axes) == 1 and len(shares) == 1:
         parts = cut(loaded, shares[0], axes[0], start=start, correct=correct)
     else:
@@ -230,8 +230,8 @@ def morph(
     written = result.save(output)
     if not quiet:
         typer.echo(result.summary())
-        frames = f" with {len(written) - 1} frames beside it" if len(written) > 1 else ""
-        typer.echo(f"written to {output}{frames}")
+        beside = f" with {len(written) - 1} frames beside it" if len(written) > 1 else ""
+        typer.echo(f"written to {output}{beside}")
 
 
 def _solid_torus(path: Path, orient: bool, compact: bool) -> TetMesh:

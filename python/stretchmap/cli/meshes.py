@@ -33,11 +33,15 @@ def info(
     if json is not None:
         common.check_output(json, (json.suffix.lower(),), input)
     mesh = common.read_mesh(input, orient, compact)
-    solid = isinstance(mesh, TetMesh)
     diagnosis = mesh.diagnose()
+    obstacle = ""
     try:
-        mesh.require_solid_torus() if solid else mesh.require_genus_one()
-        obstacle = ""
+        if isinstance(mesh, TetMesh):
+            size = f"volume {mesh.volume:.6g}"
+            mesh.require_solid_torus()
+        else:
+            size = f"area {mesh.area:.6g}"
+            mesh.require_genus_one()
     except MeshError as error:
         obstacle = str(error)
     report: dict[str, Any] = {
@@ -58,7 +62,6 @@ def info(
         "versions": versions(),
     }
     if not quiet:
-        size = f"volume {mesh.volume:.6g}" if solid else f"area {mesh.area:.6g}"
         typer.echo(diagnosis.summary())
         typer.echo(size)
         typer.echo(f"can be mapped to the torus: {'no' if obstacle else 'yes'}")

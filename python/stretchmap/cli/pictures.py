@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from . import common
 from .common import Json, MapFile, Output, Quiet
+
+if TYPE_CHECKING:
+    from ..mesh.meshes import TetMesh
 
 
 class Kind(str, Enum):
@@ -121,7 +125,7 @@ def demo(
         raise NotADirectoryError(20, "is a file, not a folder", str(output))
     if json is not None:
         common.check_output(json, (json.suffix.lower(),))
-    makers = {
+    makers: dict[Sample, Callable[[int], TetMesh]] = {
         Sample.vertebra: samples.vertebra_like,
         Sample.bumpy: samples.bumpy_torus,
         Sample.knot: samples.knot_tube,

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,7 +35,19 @@ from .points import PointMap
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["MapResult"]
+__all__ = ["Kind", "MapResult"]
+
+# Of pictures, see `stretchmap.plot`.
+Kind = Literal[
+    "checkerboard",
+    "cutaway",
+    "levels",
+    "registration",
+    "loops",
+    "domain",
+    "ratios",
+    "convergence",
+]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -84,7 +96,7 @@ class MapResult(HasSummary):
         state = "converged" if self.converged else "not converged"
         return f"{type(self).__name__}({size}, {state})"
 
-    def plot(self, kind: str, **options: Any) -> Figure:
+    def plot(self, kind: Kind, **options: Any) -> Figure:
         """Picture of the map.
 
         Parameters

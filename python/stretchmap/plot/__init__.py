@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileFormatError, OptionError
-from ..maps.result import MapResult
+from ..maps.result import Kind, MapResult
 from ..mesh.meshes import TetMesh
 from .comparisons import comparison
 from .pairs import registration
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "KINDS",
+    "Kind",
     "checkerboard",
     "comparison",
     "convergence",
@@ -42,7 +43,7 @@ __all__ = [
     "save",
 ]
 
-KINDS: dict[str, Callable[..., Figure]] = {
+KINDS: dict[Kind, Callable[..., Figure]] = {
     "checkerboard": checkerboard,
     "cutaway": cutaway,
     "levels": levels,
@@ -54,7 +55,7 @@ KINDS: dict[str, Callable[..., Figure]] = {
 }
 
 
-def kinds(result: MapResult) -> tuple[str, ...]:
+def kinds(result: MapResult) -> tuple[Kind, ...]:
     """Kinds of pictures a map has data for, keys of ``KINDS``.
 
     Parameters
@@ -62,7 +63,7 @@ def kinds(result: MapResult) -> tuple[str, ...]:
     result : MapResult
     """
     solid, torus = isinstance(result.mesh, TetMesh), result.torus is not None
-    lacking = {
+    lacking: dict[Kind, bool] = {
         "checkerboard": not torus,
         "domain": not torus,
         "cutaway": not solid,
@@ -73,7 +74,7 @@ def kinds(result: MapResult) -> tuple[str, ...]:
     return tuple(kind for kind in KINDS if not lacking.get(kind, False))
 
 
-def picture(result: MapResult, kind: str, **options: Any) -> Figure:
+def picture(result: MapResult, kind: Kind, **options: Any) -> Figure:
     """Picture of a map by name.
 
     Parameters

@@ -24,6 +24,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Morph", "morph"]
 
+_COLLECTION = """<?xml version="1.0"?>
+<VTKFile type="Collection" version="0.1">
+  <Collection>
+{}
+  </Collection>
+</VTKFile>
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Morph(HasSummary):
@@ -50,7 +58,7 @@ class Morph(HasSummary):
     def frame(self, i: int) -> NDArray[np.float64]:
         """(n, 3) vertices of frame i."""
         t = self.times[i]
-        return (1.0 - t) * self.solid.V + t * self.image
+        return np.asarray((1.0 - t) * self.solid.V + t * self.image)
 
     def to_dict(self) -> dict[str, Any]:
         """The figures, JSON-compatible."""
@@ -91,10 +99,7 @@ class Morph(HasSummary):
             f'    <DataSet timestep="{t:.6g}" file={quoteattr(frame.name)}/>'
             for t, frame in zip(self.times, frames, strict=True)
         ]
-        text = "\n".join(
-            ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>",
-             *lines, "  </Collection>", "</VTKFile>", ""]
-        )  # fmt: skip
+        text = _COLLECTION.format("\n".join(lines))
         with ExitStack() as stack:
             # The frames appear together, once all of them are written.
             for i, frame in enumerate(frames):

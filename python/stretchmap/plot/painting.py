@@ -49,6 +49,11 @@ class View:
         axes = np.stack([right, np.cross(towards, right), towards])
         return axes if self.frame is None else axes @ self.frame
 
+    def turned(self, rotation: Array) -> View:
+        """The view that shows ``points @ rotation`` as this one shows the points."""
+        frame = np.eye(3) if self.frame is None else self.frame
+        return View(self.elevation, self.azimuth, frame @ rotation)
+
     def opposite(self) -> View:
         """Looking the other way along the same line."""
         return View(-self.elevation, self.azimuth + 180.0, self.frame)
@@ -185,4 +190,5 @@ def subdivided(corners: Array, pieces: int) -> Array:
     ]
     nodes = np.array(up + down, float) / k  # (k^2, 3, 2)
     weights = np.concatenate([1.0 - nodes.sum(axis=2, keepdims=True), nodes], axis=2)
-    return np.einsum("pqc,mcd->mpqd", weights, corners).reshape(-1, 3, corners.shape[2])
+    pieces_of_each = np.einsum("pqc,mcd->mpqd", weights, corners)
+    return np.asarray(pieces_of_each.reshape(-1, 3, corners.shape[2]))

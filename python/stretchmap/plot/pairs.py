@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..errors import OptionError
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
-from .painting import Array, Scene, View
-from .style import BLACK, along, broad_view, empty_figure
+from .painting import Array, Scene
+from .style import BELOW, BLACK, along, broad_view, empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,9 +68,10 @@ def registration(result: MapResult) -> Figure:
     front = broad_view(solid.V)
     turned = similarity(solid.V[ids], image[ids])[0]
     for row, view in zip(figure.subplots(2, 2), (front, front.opposite()), strict=True):
-        other = View(view.elevation, view.azimuth, view.frame @ turned)  # type: ignore[operator]
-        ends = (("source", solid.V, solid.V[marks], None, view),
-                ("target", image, goals, image[marks], other))  # fmt: skip
+        ends = (
+            ("source", solid.V, solid.V[marks], None, view),
+            ("target", image, goals, image[marks], view.turned(turned)),
+        )
         for axes, (name, points, dots, rings, stand) in zip(row, ends, strict=True):
             scene = Scene(stand)
             scene.add_faces(points[faces], pale)
@@ -84,14 +85,10 @@ def registration(result: MapResult) -> Figure:
             side = "one side" if view is front else "the other side"
             axes.set_title(f"{name}, seen from {side}", fontsize=10)
     what = "landmark" if len(pairs) else "point of the source and its image"
-    looks = {"linestyle": "", "marker": "o", "markeredgecolor": BLACK}
-    figure.legend(
-        handles=[
-            Line2D([], [], color="#35B779", ms=6, label=what, **looks),
-            Line2D([], [], markerfacecolor="none", ms=9, label="carried by the map", **looks),
-        ],
-        loc="outside lower center", ncols=2, frameon=False,
-    )  # fmt: skip
+    dot, ring = (Line2D([], [], linestyle="", marker="o", mec=BLACK) for _ in range(2))
+    dot.set(label=what, markerfacecolor="#35B779", markersize=6)
+    ring.set(label="carried by the map", markerfacecolor="none", markersize=9)
+    figure.legend(handles=[dot, ring], loc=BELOW, ncols=2, frameon=False)
     return figure
 
 
@@ -105,10 +102,8 @@ def _mark(axes: Axes, at: Array, colors: Array, seen: NDArray[np.intp]) -> None:
     width = float(np.diff(axes.get_xlim())[0])
     for i, place in zip(seen, _out_of_the_way(at[seen] / width) * width, strict=True):
         axes.plot(*np.stack([at[i], place]).T, color=BLACK, linewidth=0.5, zorder=2)
-        axes.text(
-            *place, str(i), fontsize=8, ha="center", va="center", zorder=4,
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
-        )  # fmt: skip
+        number = axes.text(*place, str(i), fontsize=8, ha="center", va="center", zorder=4)
+        number.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
 
 
 def _out_of_the_way(dots: Array) -> Array:
@@ -124,7 +119,7 @@ def _out_of_the_way(dots: Array) -> Array:
         reach = np.where(np.arange(len(others)) < len(places), _APART, 0.7 * _APART)
         push = np.clip(reach - distance, 0.0, None) / np.maximum(distance, 1e-9)
         places = places + 0.5 * (push[:, :, None] * gap).sum(axis=1)
-    return places
+    return np.asarray(places)
 
 
 def _far_apart(points: Array, count: int) -> NDArray[np.intp]:

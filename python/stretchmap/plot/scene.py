@@ -18,6 +18,7 @@ from ..base.files import atomic_path
 from ..errors import ArrayError, FileFormatError, MissingDependencyError, OptionError
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh, TriMesh
+from .solids import Color
 from .style import principal
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ _COLORS = {"coordinate": ("viridis", None), "ratio": ("cividis", (0.5, 1.5))}
 
 
 def cut(
-    result: MapResult, color: str = "coordinate", *, off_screen: bool = True
+    result: MapResult, color: Color = "coordinate", *, off_screen: bool = True
 ) -> pyvista.Plotter:
     """The solid torus, cut open by a plane through its axis.
 
@@ -69,10 +70,9 @@ def cut(
     plotter = pv.Plotter(off_screen=off_screen)
     # The line break keeps the title off the numbers below it.
     title = ("place in the source" if color == "coordinate" else "volume ratio") + "\n"
-    plotter.add_mesh(
-        half, scalars=color, cmap=table, clim=limits or (place.min(), place.max()), ambient=0.3,
-        scalar_bar_args={"title": title, "position_x": 0.2, "position_y": 0.01, "height": 0.11},
-    )  # fmt: skip
+    bar = {"title": title, "position_x": 0.2, "position_y": 0.01, "height": 0.11}
+    clim = limits or (place.min(), place.max())
+    plotter.add_mesh(half, scalars=color, cmap=table, clim=clim, ambient=0.3, scalar_bar_args=bar)
     _look(plotter)
     return plotter
 
@@ -111,11 +111,9 @@ def loops(mesh: TriMesh | TetMesh, *, off_screen: bool = True) -> pyvista.Plotte
     if basis.tunnel_classes is not None:
         families.append(("tunnel", "#0072B2", basis.tunnel_loops))
     for name, shade, found in families:
+        look = {"color": shade, "line_width": 9, "render_lines_as_tubes": True}
         for loop in found:
-            plotter.add_mesh(
-                _ring(pv, surface.V[loop]), color=shade, line_width=9, label=f"{name} loop",
-                render_lines_as_tubes=True,
-            )  # fmt: skip
+            plotter.add_mesh(_ring(pv, surface.V[loop]), label=f"{name} loop", **look)
     plotter.add_legend(bcolor="white", size=(0.2, 0.08 * len(families)))
     _look(plotter)
     return plotter

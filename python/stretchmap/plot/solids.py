@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,20 @@ from ..base.torus import TWO_PI
 from ..errors import ArrayError, OptionError
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
+from ..partitions.parts import Coordinate, partition
 from .painting import Array, Scene, View
-from .style import along, broad_view, cividis, color_bar, empty_figure, frame, steps
+from .style import BELOW, along, broad_view, cividis, color_bar, empty_figure, frame, steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Color = Literal["coordinate", "ratio"]
 _TORUS = "image, the solid torus"
 _BINS = 36  # directions an opening may have
 _LOW, _RIGHT = 0.6, 0.5  # how far below and to the right of the viewer it is best seen
 
 
-def cutaway(result: MapResult, color: str = "coordinate", opening: float = 0.35) -> Figure:
+def cutaway(result: MapResult, color: Color = "coordinate", opening: float = 0.35) -> Figure:
     """Source and image side by side, laid open: tets are cut by planes of the image.
 
     From a solid torus a sector around the axis is taken out, and from the source what is mapped to
@@ -85,7 +87,7 @@ def cutaway(result: MapResult, color: str = "coordinate", opening: float = 0.35)
 def levels(
     result: MapResult,
     fractions: int | Sequence[float] = 5,
-    by: str = "s",
+    by: Coordinate = "s",
     opening: float = 0.4,
 ) -> Figure:
     """Parts between level surfaces in colors, in the source and in the solid torus (Figure 7.3).
@@ -118,8 +120,6 @@ def levels(
     MissingDependencyError
         matplotlib is not installed.
     """
-    from ..partitions.parts import partition
-
     if by not in ("s", "u", "v") or not 0.0 <= opening < 1.0:
         raise OptionError("by must be 's', 'u' or 'v' and 0 <= opening < 1")
     figure = empty_figure(9.6, 4.9)
@@ -140,14 +140,12 @@ def levels(
     ends = (("source", pieces.source, view), (_TORUS, pieces.image, _torus_view(front)))
     _side_by_side(figure, ends, faces, shades[pieces.parent[tets]])
     columns = math.ceil(parts.n_parts / math.ceil(parts.n_parts / 5))
-    figure.legend(
-        handles=[
-            Patch(color=shade, label=f"part {i}: {100 * share:.3g} %")
-            for i, (shade, share) in enumerate(zip(shades, parts.fractions, strict=True))
-        ],
-        title="share of the volume" + (", from the core outwards" if by == "s" else ""),
-        loc="outside lower center", ncols=columns, frameon=False,
-    )  # fmt: skip
+    patches = [
+        Patch(color=shade, label=f"part {i}: {100 * share:.3g} %")
+        for i, (shade, share) in enumerate(zip(shades, parts.fractions, strict=True))
+    ]
+    legend = figure.legend(handles=patches, loc=BELOW, ncols=columns, frameon=False)
+    legend.set_title("share of the volume" + (", from the core outwards" if by == "s" else ""))
     return figure
 
 
@@ -202,7 +200,7 @@ class _Pieces:
     def angles(self) -> Array:
         """(k,) angle around the axis of the middle of each tet."""
         x, y, _ = self.image[self.T].mean(axis=1).T
-        return np.arctan2(y, x)
+        return np.asarray(np.arctan2(y, x))
 
     def faces(self, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
         """Boundary faces of some of the tets, and the tet each belongs to."""

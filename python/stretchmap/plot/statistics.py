@@ -48,14 +48,10 @@ def ratios(result: MapResult) -> Figure:
     for values, label, color in ((before, name, ORANGE), (after, "final map", BLUE)):
         clipped = np.clip(values, low, high)
         share = np.full(len(values), 100.0 / len(values))
-        axes.hist(
-            clipped, bins=bins, weights=share, histtype="stepfilled", color=color, alpha=0.35,
-            edgecolor="none",
-        )  # fmt: skip
-        axes.hist(
-            clipped, bins=bins, weights=share, histtype="step", color=color, linewidth=1.6,
-            label=f"{label}: SD {values.std():.3g}, {int((values <= 0.0).sum())} flipped",
-        )  # fmt: skip
+        percent, _ = np.histogram(clipped, bins, weights=share)
+        axes.stairs(percent, bins, fill=True, color=color, alpha=0.35)
+        text = f"{label}: SD {values.std():.3g}, {int((values <= 0.0).sum())} flipped"
+        axes.stairs(percent, bins, color=color, linewidth=1.6, label=text)
     axes.axvline(1.0, color=BLACK, linewidth=0.8, linestyle=":")
     axes.set_xlim(low, high)
     axes.set_yscale("log")
@@ -104,9 +100,11 @@ def convergence(result: MapResult) -> Figure:
             top.plot(position[at], values / scale, label=stage, **look)
         counted = at & (flips >= 0)
         bottom.plot(position[counted], flips[counted], **look)
-    for name, label, style, color in (
-        ("element_std", "elements", "o-", BLACK), ("ring_std", "vertex rings", "s--", GRAY),
-    ):  # fmt: skip
+    spreads = (
+        ("element_std", "elements", "o-", BLACK),
+        ("ring_std", "vertex rings", "s--", GRAY),
+    )
+    for name, label, style, color in spreads:
         values = np.array([getattr(record, name) for record in history])
         if np.isfinite(values).any():
             middle.plot(position, values, style, ms=3, color=color, label=label)

@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BELOW = "outside lower center"  # of a figure, for legends
 BLACK, GRAY = "#000000", "#8C8C8C"
 ORANGE, BLUE, VERMILION = "#E69F00", "#0072B2", "#D55E00"
-LIGHT_GREY = np.array([0.86, 0.86, 0.86])
+LIGHT_GRAY = np.array([0.86, 0.86, 0.86])
 
 
 def empty_figure(width: float, height: float) -> Figure:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import OptionError
 from ..maps.result import MapResult, corner_turns
@@ -12,7 +13,7 @@ from ..mesh.meshes import TetMesh, TriMesh
 from .painting import Array, Scene, View, subdivided
 from .style import (
     BLUE,
-    LIGHT_GREY,
+    LIGHT_GRAY,
     VERMILION,
     along,
     boundary,
@@ -161,12 +162,12 @@ def loops(result: MapResult | TriMesh | TetMesh) -> Figure:
 
     mesh = result.mesh if isinstance(result, MapResult) else result
     solid = mesh if isinstance(mesh, TetMesh) else None
-    surface = mesh.surface if solid is not None else mesh
+    surface = mesh.surface if isinstance(mesh, TetMesh) else mesh
     basis = homology_basis(surface, solid)
     size = float(np.ptp(surface.V, axis=0).max())
     axes = figure.add_subplot()
     scene = Scene(broad_view(surface.V))
-    scene.add_faces(surface.V[surface.F], np.tile(LIGHT_GREY, (surface.n_faces, 1)))
+    scene.add_faces(surface.V[surface.F], np.tile(LIGHT_GRAY, (surface.n_faces, 1)))
     families = [("handle loop, bounds inside", VERMILION, basis.handle_loops)]
     if basis.tunnel_classes is not None:
         families.append(("tunnel loop, bounds outside", BLUE, basis.tunnel_loops))
@@ -174,14 +175,13 @@ def loops(result: MapResult | TriMesh | TetMesh) -> Figure:
         for loop in found:
             scene.add_loop(surface.V[loop], color, 0.014 * size, 0.02 * size)
     scene.draw(axes)
-    axes.legend(
-        handles=[Line2D([], [], color=color, lw=3, label=name) for name, color, _ in families],
-        loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=2, frameon=False,
-    )  # fmt: skip
+    lines = [Line2D([], [], color=color, lw=3, label=name) for name, color, _ in families]
+    below = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0)}
+    axes.legend(handles=lines, ncols=2, frameon=False, **below)
     return figure
 
 
-def _cut_at_cells(corners: Array, columns: np.ndarray) -> Array:
+def _cut_at_cells(corners: Array, columns: NDArray[np.intp]) -> Array:
     """Triangles cut small where they cross from one cell of the integer lattice to another.
 
     ``corners`` is (m, 3, d); the ``columns`` among the d are the coordinates that have cells.

@@ -236,7 +236,7 @@ def choose_gauge(
         ids, goals = landmarks[:, 0], target.surface.V[landmarks[:, 1]]
     else:
         step = max(1, source.surface.n_vertices // _SAMPLE)
-        ids, goals = np.arange(0, source.surface.n_vertices, step), None
+        ids, goals = np.arange(0, source.surface.n_vertices, step, dtype=np.int32), None
     size = float(np.linalg.norm(np.ptp(target.surface.V, axis=0)))
     grid = np.stack(np.meshgrid(*[np.arange(_GRID) / _GRID] * 2, indexing="ij"), -1).reshape(-1, 2)
 
@@ -245,7 +245,7 @@ def choose_gauge(
         y = (source.turns[ids] @ matrix.T)[None] + shifts[:, None]
         images = target.points(y.reshape(-1, 2)).reshape(len(shifts), len(ids), 3)
         if goals is not None:
-            return np.sqrt(((images - goals) ** 2).sum(axis=2).mean(axis=1))
+            return np.asarray(np.sqrt(((images - goals) ** 2).sum(axis=2).mean(axis=1)))
         return _similarity_misfits(source.surface.V[ids], images)
 
     best = (np.inf, 1, 0, np.zeros(2))
@@ -277,4 +277,4 @@ def _similarity_misfits(
     S[:, 2] *= np.sign(np.linalg.det(U @ W))
     scale = S.sum(axis=1) / (p**2).sum()
     left = (q**2).sum(axis=(1, 2)) - scale * S.sum(axis=1)
-    return np.sqrt(np.maximum(left, 0.0) / len(points))
+    return np.asarray(np.sqrt(np.maximum(left, 0.0) / len(points)))

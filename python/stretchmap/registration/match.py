@@ -98,12 +98,12 @@ def affine_landmark_map(
     matrix = triangulation.transform[found]
     first = np.einsum("nij,nj->ni", matrix[:, :2], y - base - matrix[:, 2])
     weights = np.column_stack([first, 1.0 - first.sum(axis=1)])
-    return y + np.einsum("ni,nij->nj", weights, moves[corners[found]])
+    return np.asarray(y + np.einsum("ni,nij->nj", weights, moves[corners[found]]))
 
 
 def _double_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _worst_pair(
@@ -113,7 +113,7 @@ def _worst_pair(
     pairs = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     gap = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
     strain = np.linalg.norm(moves[pairs[:, 0]] - moves[pairs[:, 1]], axis=1) / gap
-    return pairs[int(np.argmax(strain))].astype(np.intp)
+    return np.asarray(pairs[int(np.argmax(strain))], np.intp)
 
 
 class SurfaceProblem:

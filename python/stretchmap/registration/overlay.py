@@ -59,7 +59,9 @@ def overlay_splits(
     exact = _EXACT * float(np.linalg.norm(np.ptp(target.surface.V, axis=0)))
     by_vertex = _at_target_vertices(surface, target, y, points, faces, exact)
     by_edge = _at_crossings(surface, target, y, points, faces, exact)
-    edges, shares, where = (np.concatenate(parts) for parts in zip(by_vertex, by_edge, strict=True))
+    edges = np.concatenate([by_vertex[0], by_edge[0]])
+    shares = np.concatenate([by_vertex[1], by_edge[1]])
+    where = np.concatenate([by_vertex[2], by_edge[2]])
     _, once = np.unique(edges, axis=0, return_index=True)
     once.sort()
     return edges[once], np.clip(shares[once], _LEAST_SHARE, 1.0 - _LEAST_SHARE), where[once]

@@ -81,4 +81,4 @@ def _vertex_normals(V: NDArray[np.float64], F: NDArray[np.int32]) -> NDArray[np.
     face = _core.mesh.face_area_vectors(V, F)
     sums = [np.bincount(F.ravel(), np.repeat(c, 3), minlength=len(V)) for c in face.T]
     normals = np.stack(sums, axis=1)
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))

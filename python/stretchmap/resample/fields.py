@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
@@ -20,8 +22,8 @@ def transfer(
     registration: MapResult,
     values: ArrayLike,
     *,
-    conserve: str = "integral",
-    per: str = "vertex",
+    conserve: Literal["integral", "mean"] = "integral",
+    per: Literal["vertex", "tet"] = "vertex",
 ) -> NDArray[np.float64]:
     """Carry a field from the source to the target of a registration.
 
@@ -131,4 +133,4 @@ def _shifted(
     room = np.where(missing > 0.0, high - means, low - means)
     most = volumes @ room
     share = np.divide(missing, most, out=np.zeros_like(missing), where=most != 0.0)
-    return means + np.clip(share, 0.0, 1.0) * room
+    return np.asarray(means + np.clip(share, 0.0, 1.0) * room)

@@ -177,9 +177,10 @@ def _repaired(
     progress: Progress | None,
 ) -> NDArray[np.float64]:
     """The points after `GridRepair`; u and v are those of the rim."""
-    solid, torus = result.mesh, result.torus
+    mapped, solid = as_map_of_solid(result, "a grid")
     surface = FlatSurface.of(solid.surface)
-    angles = np.stack(torus.coordinates(result.image[solid.boundary_vertices])[:2], axis=1)
+    image = mapped.image[solid.boundary_vertices]
+    angles = np.stack(torus_of(mapped).coordinates(image)[:2], axis=1)
     turns = np.ascontiguousarray(angles / TWO_PI)
     edges = solid.surface.edges
     # Along an edge the angles change by less than half a turn; the rest is whole turns.
