@@ -121,7 +121,8 @@ def _write_nastran(
     # The large format: fields of sixteen characters, so that numbers keep ten digits.
     blank = " " * 16  # the basic coordinate system
     _rows(file, f"GRID*   %16d{blank}%16.9E%16.9E\n*       %16.9E\n", np.column_stack([ids, V]))
-    property_ids = 100 * cells[second] + cells[first] + 1
+    block, layer = (np.asarray(cells[name], int) for name in (first, second))
+    property_ids = 100 * layer + block + 1
     _rows(
         file,
         "CHEXA   " + "%8d" * 8 + "+\n+       " + "%8d" * 2 + "\n",

@@ -141,7 +141,7 @@ class HexMesh(HasSummary):
             **dict(zip("uvs", self.coordinates.T, strict=True)),
             "grid": self.grid,
         }
-        cells = {
+        cells: dict[str, NDArray[Any]] = {
             "block": self.block,
             "layer": self.layer,
             "scaled_jacobian": self.scaled_jacobians,

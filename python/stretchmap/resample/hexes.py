@@ -30,6 +30,7 @@ from .repair import GridRepair
 if TYPE_CHECKING:
     from ..maps.points import PointMap
     from ..maps.result import MapResult
+    from ..mesh.meshes import TetMesh
 
 __all__ = ["HexMesh", "hex_mesh"]
 
@@ -84,7 +85,7 @@ def hex_mesh(
         If the core of the torus lies outside the image, or the repair fails; then ``ids`` are the
         hexahedra that are left.
     """
-    result, _ = as_map_of_solid(result, "a grid of hexahedra")
+    result, solid = as_map_of_solid(result, "a grid of hexahedra")
     torus = torus_of(result)
     sections, block, rings = (
         whole("sections", sections, 3, _MOST),
@@ -107,7 +108,8 @@ def hex_mesh(
     shares = _core.resample.hex_volumes(grid, H)
     shares /= shares.sum()
     if repair and (n_invalid or _core.resample.scaled_jacobians(V, H).min() < _LEAST):
-        V = _repaired(result, pulled, H, shares, rim, u[rim], v[rim], progress)
+        angles = result.coordinates()[solid.boundary_vertices, :2]
+        V = _repaired(solid, angles, pulled, H, shares, rim, u[rim], v[rim], progress)
         left = np.flatnonzero(_core.resample.valid_hexes(V, H) == 0)
         if len(left):
             raise SolverError(
@@ -115,18 +117,19 @@ def hex_mesh(
                 "block or rings, repair=False returns the grid as it was pulled back",
                 left,
             )
-    return _measured(result, layout, grid, pulled, V, n_invalid)
+    return _measured(solid, torus, layout, grid, pulled, V, n_invalid)
 
 
 def _measured(
-    result: MapResult,
+    solid: TetMesh,
+    torus: Torus,
     layout: Layout,
     grid: NDArray[np.float64],
     pulled: NDArray[np.float64],
     V: NDArray[np.float64],
     n_invalid: int,
 ) -> HexMesh:
-    solid, H = result.mesh, layout.H
+    H = layout.H
     volumes = _core.resample.hex_volumes(V, H)
     shares = _core.resample.hex_volumes(grid, H)
     diagonal = float(np.linalg.norm(np.ptp(solid.V, axis=0)))
@@ -136,7 +139,7 @@ def _measured(
         V=read_only(V),
         H=read_only(H),
         grid=read_only(grid),
-        coordinates=read_only(np.stack(torus_of(result).coordinates(grid), axis=-1)),
+        coordinates=read_only(np.stack(torus.coordinates(grid), axis=-1)),
         block=read_only(layout.block),
         layer=read_only(layout.layer),
         jacobians=read_only(_core.resample.scaled_jacobians(V, H)),
@@ -167,7 +170,8 @@ def _reach(
 
 
 def _repaired(
-    result: MapResult,
+    solid: TetMesh,
+    angles: NDArray[np.float64],
     V: NDArray[np.float64],
     H: NDArray[np.int32],
     shares: NDArray[np.float64],
@@ -176,11 +180,8 @@ def _repaired(
     v: NDArray[np.float64],
     progress: Progress | None,
 ) -> NDArray[np.float64]:
-    """The points after `GridRepair`; u and v are those of the rim."""
-    mapped, solid = as_map_of_solid(result, "a grid")
+    """The points after `GridRepair`; angles are those of the boundary, u and v of the rim."""
     surface = FlatSurface.of(solid.surface)
-    image = mapped.image[solid.boundary_vertices]
-    angles = np.stack(torus_of(mapped).coordinates(image)[:2], axis=1)
     turns = np.ascontiguousarray(angles / TWO_PI)
     edges = solid.surface.edges
     # Along an edge the angles change by less than half a turn; the rest is whole turns.
