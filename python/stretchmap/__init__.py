@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from .registration.map import Registration as Registration
     from .registration.map import register as register
     from .resample.fields import transfer as transfer
-    from .resample.hexes import HexMesh as HexMesh
+    from .resample.hex_result import HexMesh as HexMesh
     from .resample.hexes import hex_mesh as hex_mesh
     from .volume.map import VolumeMap as VolumeMap
     from .volume.map import volume_map as volume_map
@@ -125,7 +125,7 @@ _EXPORTS = {
     "read_landmarks": "registration.landmarks",
     "Registration": "registration.map",
     "register": "registration.map",
-    "HexMesh": "resample.hexes",
+    "HexMesh": "resample.hex_result",
     "hex_mesh": "resample.hexes",
     "transfer": "resample.fields",
     "Morph": "plot.morphing",

@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,16 @@ from ..errors import OptionError
 from ..maps.history import IterationRecord
 from ..maps.result import MapResult
 from .finish import finish_areas
-from .search import search_phase
+from .search import Ratio, search_phase
 from .sem import minimize_stretch, start_angles
 
 if TYPE_CHECKING:
     from ..homology.basis import HomologyBasis
     from ..mesh.meshes import TriMesh
 
-__all__ = ["AreaMap", "area_map"]
+__all__ = ["AreaMap", "Finish", "area_map"]
+
+Finish = Literal["ring", "face", "none"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -104,8 +106,8 @@ def area_map(
     conformal: ConformalMap | None = None,
     torus: Torus | None = None,
     phase: float | None = None,
-    ratio: str | float = "conformal",
-    finish: str = "ring",
+    ratio: Ratio | float = "conformal",
+    finish: Finish = "ring",
     max_iter: int = 30,
     tol: float = 5e-3,
     shape_budget: float = 1.2,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from ..conformal.torus import conformal_torus
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
+
+Ratio = Literal["conformal", "search"]
+
 _SAMPLE = 6000  # faces that suffice for the search
 
 _PHASES = 36  # first round of the search around the tube
@@ -23,7 +26,7 @@ def search_phase(
     turns: NDArray[np.float64],
     aspect: float,
     phase: float | None,
-    ratio: str | float,
+    ratio: Ratio | float,
 ) -> tuple[float, float]:
     """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image."""
     sample = surface.F[:: -(-len(surface.F) // _SAMPLE)]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from numpy.typing import ArrayLike, NDArray
 
 from ..area.map import AreaMap, area_map
+from ..area.search import Ratio
 from ..base.arrays import read_only
 from ..base.progress import Progress
 from ..base.threads import takes_threads
@@ -116,7 +117,7 @@ def volume_map(
     c: float | None = None,
     max_iter: int | None = None,
     tol: float | None = None,
-    ratio: str | float | None = None,
+    ratio: Ratio | float | None = None,
     phase: float | None = None,
     boundary_map: AreaMap | None = None,
     start: ArrayLike | None = None,

@@ -1,0 +1,34 @@
+"""What somebody writes who uses the package: checked by mypy as it is and with mistakes in it."""
+
+import numpy as np
+
+import stretchmap as sm
+
+
+def show(stage: str, done: int, total: int, **values: float) -> None:
+    print(stage, done, total, values)
+
+
+solid = sm.read_solid("part.msh", compact=True)
+surface = solid.surface
+result = sm.volume_map(solid, ratio="search", threads=2, progress=show)
+spread: float = result.distortion.ring_std
+radii = (result.torus.R, result.torus.r)
+proven: bool = result.certificate.certified
+added = None if result.refinement is None else result.refinement.n_split
+area = sm.area_map(surface, finish="ring", ratio=2.5)
+flat = sm.conformal_map(surface, weights="clamped", progress=show)
+classes = sm.homology_basis(surface, solid).torus_classes
+parts = sm.partition(result, [0.2, 0.8], by="u")
+grid = sm.partition(result, (3, [0.5, 0.5]), by=("s", "v")).part(0).n_tets
+other = sm.register(solid, sm.samples.bumpy_torus(1500))
+density = sm.transfer(other, np.ones(solid.n_tets), per="tet")
+loaded = sm.load_map("map.npz")
+count = loaded.mesh.n_tets if isinstance(loaded.mesh, sm.TetMesh) else loaded.mesh.n_faces
+history = [record.ring_std for record in loaded.history if record.stage == "vsem"]
+with sm.threads(1):
+    figure = sm.plot.picture(result, "levels", by="s")
+try:
+    surface.require_genus_one()
+except sm.errors.GenusError as error:
+    print(error.ids)
