@@ -1,0 +1,16 @@
+from __future__ import annotations
+import numpy
+import numpy.typing
+import stretchmap._core.mesh
+import typing
+__all__: list[str] = ['chart_areas', 'cotangent_weights', 'harmonic_forms', 'hodge_products', 'intrinsic_delaunay']
+def chart_areas(topology: stretchmap._core.mesh.SurfaceTopology, first: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], second: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    ...
+def cotangent_weights(topology: stretchmap._core.mesh.SurfaceTopology, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    ...
+def harmonic_forms(n_vertices: typing.SupportsInt | typing.SupportsIndex, edges: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], eta: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
+    ...
+def hodge_products(topology: stretchmap._core.mesh.SurfaceTopology, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], forms: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
+    ...
+def intrinsic_delaunay(topology: stretchmap._core.mesh.SurfaceTopology, edge_length: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], eta: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]", "flags.c_contiguous"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"], int]:
+    ...

@@ -1,0 +1,19 @@
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import stretchmap._core.mesh
+import typing
+__all__: list[str] = ['linking_matrix', 'periods', 'shortest_loop', 'solid_cohomology', 'tree_cotree', 'wedge_matrix']
+def linking_matrix(topology: stretchmap._core.mesh.SurfaceTopology, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], loops: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]]) -> typing.Annotated[numpy.typing.NDArray[numpy.int64], "[m, n]"]:
+    ...
+def periods(topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]", "flags.c_contiguous"], loop: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+    ...
+def shortest_loop(topology: stretchmap._core.mesh.SurfaceTopology, edge_length: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]", "flags.c_contiguous"], target: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"], crossing: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> list[int]:
+    ...
+def solid_cohomology(tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], edges: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex, loops: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]]:
+    ...
+def tree_cotree(topology: stretchmap._core.mesh.SurfaceTopology, edge_length: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> tuple[list[list[int]], typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]]:
+    ...
+def wedge_matrix(topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    ...
