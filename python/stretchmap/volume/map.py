@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from numpy.typing import ArrayLike, NDArray
 
-from ..area.map import AreaMap, area_map
+from ..area.map import AreaMap, Finish, area_map
 from ..area.search import Ratio
 from ..base.arrays import read_only
 from ..base.progress import Progress
@@ -224,7 +224,8 @@ def volume_map(
             ratio = "search" if certified else "conformal"
         # A gliding boundary loses the exact areas again; a held one is only as good as them.
         # Its last per cent costs triangles their shape, which the interior has to pay for.
-        finish, area_tol = ("face" if boundary == "frozen" else "none", 0.05)
+        finish: Finish = "face" if boundary == "frozen" else "none"
+        area_tol = 0.05
         if not certified:
             finish, area_tol = "ring", 5e-3
         boundary_map = area_map(

@@ -180,7 +180,8 @@ class Marginals:
         self, x: NDArray[np.float64], values: NDArray[np.float64], period: float
     ) -> PchipInterpolator:
         """`_below` as a function of the level."""
-        below = self._below(*self._histograms(self._amounts(x), values, period), period)
+        source, image = self._histograms(self._amounts(x), values, period)
+        below = self._below(source, image, period)
         step = period / (len(below) - 1)
         if period != TWO_PI:
             return PchipInterpolator(np.arange(len(below)) * step, below)

@@ -71,7 +71,7 @@ class SolidProblem:
     def result_scale(self, x: NDArray[np.float64]) -> float:
         """Factor that gives the image the volume of the source."""
         volume = float(_core.volume.signed_tet_volumes(x, self.solid.T).sum())
-        return self.scale * volume ** (-1.0 / 3.0)
+        return float(self.scale * volume ** (-1.0 / 3.0))
 
 
 def _enclosed_volume(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
