@@ -102,7 +102,7 @@ def as_indices(indices: ArrayLike, width: int, n: int, name: str = "F") -> NDArr
 
 
 def as_reals(
-    values: ArrayLike, name: str, shape: tuple[int | None, ...], *, finite: bool = True
+    values: ArrayLike, name: str, *shapes: tuple[int | None, ...], finite: bool = True
 ) -> NDArray[np.float64]:
     """Convert real numbers to a C-ordered array of doubles.
 
@@ -112,8 +112,8 @@ def as_reals(
         Anything else is refused: masked entries, complex numbers, truth values, text, objects.
     name : str
         What the caller names the array, for messages.
-    shape : tuple of int or None
-        Length of each axis; None where any will do.
+    *shapes : tuple of int or None
+        Shapes that will do: the length of each axis, None where any will. Without them any shape.
     finite : bool
         Refuse NaN and infinities.
 
@@ -132,12 +132,41 @@ def as_reals(
     raw = _as_array(values, name)
     if raw.dtype.kind not in "fiu":
         raise ArrayError(f"{name} must hold real numbers, not {_kind(raw)}")
-    _check_axes(raw, name, shape)
+    if shapes:
+        _check_axes(raw, name, *shapes)
     reals = _as_doubles(raw, name)
     if finite and not np.isfinite(reals).all():
         bad = _rows(~np.isfinite(reals))
         raise NonFiniteError(f"{name} has NaN or infinite values in {describe('row', bad)}", bad)
     return reals
+
+
+def as_rows(values: ArrayLike, name: str, rows: int) -> NDArray[Any]:
+    """Convert data to an array of one or two axes with so many rows, its type kept.
+
+    Parameters
+    ----------
+    values : array_like of real numbers or truth values
+        NaN and infinities are data like others; masked entries, complex numbers, text and objects
+        are refused.
+    name : str
+        What the caller names the array, for messages.
+    rows : int
+
+    Returns
+    -------
+    ndarray, shape (rows,) or (rows, c)
+
+    Raises
+    ------
+    ArrayError
+        Another shape, or not of that kind.
+    """
+    raw = _as_array(values, name)
+    if raw.dtype.kind not in "biuf":
+        raise ArrayError(f"{name} must be numeric with {rows} rows, it holds {_kind(raw)}")
+    _check_axes(raw, name, (rows,), (rows, None))
+    return raw
 
 
 def as_integers(
@@ -222,13 +251,13 @@ def _kind(raw: NDArray[Any]) -> str:
     return words.get(raw.dtype.kind, str(raw.dtype))
 
 
-def _check_axes(raw: NDArray[Any], name: str, shape: tuple[int | None, ...]) -> None:
-    if raw.ndim == len(shape) and all(
-        want in (None, have) for want, have in zip(shape, raw.shape, strict=True)
-    ):
-        return
-    words = ["any" if n is None else str(n) for n in shape]
-    expected = f"({', '.join(words)}{',' if len(words) == 1 else ''})"
+def _check_axes(raw: NDArray[Any], name: str, *shapes: tuple[int | None, ...]) -> None:
+    for shape in shapes:
+        if raw.ndim == len(shape) and all(
+            want in (None, have) for want, have in zip(shape, raw.shape, strict=True)
+        ):
+            return
+    expected = " or ".join(str(shape).replace("None", "any") for shape in shapes)
     raise ArrayError(f"{name} must have shape {expected}, not {raw.shape}")
 
 

@@ -10,15 +10,22 @@ import math
 import operator
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import FileFormatError, OptionError
 
-__all__ = ["file_path", "flag", "instance", "memory", "one_of", "real", "whole"]
+__all__ = ["as_path", "callback", "flag", "instance", "memory", "one_of", "pair", "real", "whole"]
 
 _T = TypeVar("_T")
+
+# What `float` takes all the same.
+_NO_REALS = (bool, np.bool_, str, bytes, np.complexfloating, type(np.ma.masked))
+
+# Of the core's linear systems; the last one in builds that have it.
+SOLVERS = ("auto", "direct", "multigrid", "jacobi", "cholmod")
 
 
 def whole(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
@@ -33,7 +40,7 @@ def whole(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
         if isinstance(value, (bool, np.bool_)):
             raise TypeError
         number = operator.index(value)
-    except TypeError:
+    except Exception:  # whatever an object's own conversion raises
         raise OptionError(f"{name} must be an integer, got {_shown(value)}") from None
     if number < low:
         raise OptionError(f"{name} must be at least {low}, got {_shown(number)}")
@@ -59,12 +66,11 @@ def real(
         It is none.
     """
     number = math.nan
-    if not isinstance(value, (bool, np.bool_, str, bytes)) and np.ndim(value) == 0:
-        if not isinstance(value, (complex, np.complexfloating)):
-            try:
-                number = float(value)
-            except (TypeError, ValueError, OverflowError):
-                number = math.nan
+    if not isinstance(value, _NO_REALS) and not getattr(value, "shape", ()):
+        try:
+            number = float(value)
+        except Exception:  # whatever an object's own conversion raises
+            number = math.nan
     if not math.isfinite(number):
         raise OptionError(f"{name} must be a finite number, got {_shown(value)}")
     if not (low <= number <= high and above < number < below):
@@ -114,7 +120,32 @@ def instance(name: str, value: Any, kind: type[_T], remedy: str) -> _T:
     return value
 
 
-def file_path(path: Any) -> str | os.PathLike[str]:
+def callback(name: str, value: Any) -> None:
+    """Raise unless the option is None or can be called.
+
+    Raises
+    ------
+    OptionError
+        It is something else.
+    """
+    if value is not None and not callable(value):
+        raise OptionError(f"{name} must be a function or None, got {_shown(value)}")
+
+
+def pair(name: str, value: Any, low: int, high: int = 2**31 - 1) -> tuple[int, int]:
+    """The option as two integers, each as `whole`.
+
+    Raises
+    ------
+    OptionError
+        It is no tuple or list of two, or an entry is out of range.
+    """
+    if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 2:
+        raise OptionError(f"{name} must be two integers, got {_shown(value)}")
+    return whole(f"{name}[0]", value[0], low, high), whole(f"{name}[1]", value[1], low, high)
+
+
+def as_path(path: Any) -> Path:
     """A path as `open` takes it, but no file number and no bytes.
 
     Raises
@@ -122,11 +153,13 @@ def file_path(path: Any) -> str | os.PathLike[str]:
     FileFormatError
         It is no path, or one that no file can have.
     """
-    if not isinstance(path, (str, os.PathLike)) or isinstance(os.fspath(path), bytes):
-        raise FileFormatError(f"a file is named by a path, got {_shown(path)}")
-    if "\0" in os.fspath(path):
-        raise FileFormatError("no file name holds a null character")
-    return path
+    try:
+        text = os.fspath(path)
+        if isinstance(text, bytes) or not text or b"\0" in os.fsencode(text):
+            raise TypeError
+    except Exception:  # of an object with a path of its own, whatever that raises
+        raise FileFormatError(f"a file is named by a path, got {_shown(path)}") from None
+    return Path(text)
 
 
 def memory(what: str, wanted: float) -> None:

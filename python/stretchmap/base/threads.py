@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import functools
-import operator
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import ParamSpec, TypeVar
 
 from .. import _core
-from ..errors import OptionError
+from .options import whole
 
 __all__ = ["takes_threads", "threads"]
 
@@ -44,12 +43,7 @@ def threads(count: int | None) -> Iterator[None]:
     if count is None:
         yield
         return
-    try:
-        wanted = operator.index(count)
-    except TypeError:
-        raise OptionError(f"threads must be an integer, got {count!r}") from None
-    if not 1 <= wanted <= 1024:
-        raise OptionError(f"threads must be between 1 and 1024, got {wanted}")
+    wanted = whole("threads", count, 1, 1024)
     before = _core.base.thread_count()
     _core.base.set_thread_count(wanted)
     try:

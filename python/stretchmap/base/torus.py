@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import ArrayError, OptionError
+from ..errors import ArrayError, NonFiniteError, OptionError
+from .arrays import as_reals
+from .options import real
 
 __all__ = ["Torus"]
 
@@ -36,9 +38,9 @@ class Torus:
     r: float
 
     def __post_init__(self) -> None:
-        R, r = float(self.R), float(self.r)
-        if not (math.isfinite(R) and 0.0 < r < R):
-            raise OptionError(f"a torus needs finite radii with 0 < r < R, got R = {R}, r = {r}")
+        R, r = real("R", self.R), real("r", self.r)
+        if not 0.0 < r < R:
+            raise OptionError(f"a torus needs radii with 0 < r < R, got R = {R}, r = {r}")
         object.__setattr__(self, "R", R)
         object.__setattr__(self, "r", r)
 
@@ -62,7 +64,7 @@ class Torus:
         """
         if volume is not None and area is not None:
             raise OptionError("give the volume or the area of the torus, not both")
-        torus = cls(float(ratio), 1.0)
+        torus = cls(real("ratio", ratio, above=1.0), 1.0)
         if volume is not None:
             return torus.with_volume(volume)
         return torus if area is None else torus.with_area(area)
@@ -83,7 +85,14 @@ class Torus:
         return TWO_PI * self.R * math.pi * self.r * self.r
 
     def scaled(self, factor: float) -> Torus:
-        """The torus with both radii multiplied by ``factor > 0``."""
+        """The torus with both radii multiplied by ``factor > 0``.
+
+        Raises
+        ------
+        OptionError
+            If the factor is not positive and finite.
+        """
+        factor = real("factor", factor, above=0.0)
         return Torus(self.R * factor, self.r * factor)
 
     def with_volume(self, volume: float) -> Torus:
@@ -94,7 +103,7 @@ class Torus:
         OptionError
             If the volume is not positive and finite.
         """
-        return self.scaled((_positive(volume, "volume") / self.volume) ** (1.0 / 3.0))
+        return self.scaled((real("volume", volume, above=0.0) / self.volume) ** (1.0 / 3.0))
 
     def with_area(self, area: float) -> Torus:
         """The similar torus with surface ``area > 0``.
@@ -104,7 +113,7 @@ class Torus:
         OptionError
             If the area is not positive and finite.
         """
-        return self.scaled(math.sqrt(_positive(area, "area") / self.area))
+        return self.scaled(math.sqrt(real("area", area, above=0.0) / self.area))
 
     def xi(self, u: ArrayLike, v: ArrayLike, s: ArrayLike | None = None) -> NDArray[np.float64]:
         """Points of the solid torus from toroidal coordinates, (7.1).
@@ -120,10 +129,15 @@ class Torus:
         -------
         ndarray, shape (..., 3)
             ``((R + s cos v) cos u, (R + s cos v) sin u, s sin v)``.
+
+        Raises
+        ------
+        ArrayError
+            They hold no real numbers or cannot be broadcast together.
+        NonFiniteError
+            A NaN or an infinity.
         """
-        u, v, s = np.broadcast_arrays(
-            np.asarray(u, float), np.asarray(v, float), np.asarray(self.r if s is None else s)
-        )
+        u, v, s = _together(u=u, v=v, s=self.r if s is None else s)
         rho = self.R + s * np.cos(v)
         return np.stack([rho * np.cos(u), rho * np.sin(u), s * np.sin(v)], axis=-1)
 
@@ -135,6 +149,7 @@ class Torus:
         Parameters
         ----------
         points : array_like, shape (..., 3)
+            A NaN has coordinates NaN.
 
         Returns
         -------
@@ -146,9 +161,13 @@ class Torus:
         Raises
         ------
         ArrayError
-            If the last axis does not have length 3.
+            If the last axis does not have length 3, or they are no real numbers.
+        NonFiniteError
+            An infinity.
         """
-        points = np.asarray(points, float)
+        points = as_reals(points, "points", finite=False)
+        if np.isinf(points).any():
+            raise NonFiniteError("points has infinite values")
         if points.ndim == 0 or points.shape[-1] != 3:
             raise ArrayError(f"points must have shape (..., 3), got {points.shape}")
         x, y, z = np.moveaxis(points, -1, 0)
@@ -156,8 +175,8 @@ class Torus:
         return _turn(np.arctan2(y, x)), _turn(np.arctan2(z, radial)), np.hypot(radial, z)
 
     def normal(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
-        """Outward unit normals of the torus at ``(u, v)``, shape (..., 3)."""
-        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
+        """Outward unit normals of the torus at ``(u, v)``, shape (..., 3); raises as `xi`."""
+        u, v = _together(u=u, v=v)
         return np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], axis=-1)
 
 
@@ -167,8 +186,11 @@ def _turn(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(angle >= TWO_PI, 0.0, angle)
 
 
-def _positive(value: float, name: str) -> float:
-    value = float(value)
-    if not (math.isfinite(value) and value > 0.0):
-        raise OptionError(f"{name} must be positive and finite, got {value}")
-    return value
+def _together(**values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
+    """Arrays of one shape."""
+    arrays = [as_reals(value, name) for name, value in values.items()]
+    try:
+        return np.broadcast_arrays(*arrays)
+    except ValueError:
+        shapes = ", ".join(str(array.shape) for array in arrays)
+        raise ArrayError(f"{', '.join(values)} do not go together: shapes {shapes}") from None

@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..base.arrays import as_integers, read_only
 from ..base.files import atomic_path
+from ..base.options import as_path
 from ..base.tables import HasSummary, table
-from ..errors import ArrayError, GenusError, SelfIntersectionError
+from ..errors import ArrayError, FileFormatError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms, solve_harmonic
 from ..io.npz import save_npz
 from ..mesh.given import as_solid, as_surface
@@ -272,9 +273,14 @@ class HomologyBasis(HasSummary):
 
         Raises
         ------
+        FileFormatError
+            Another suffix.
         OSError
             If the file cannot be written.
         """
+        path = as_path(path)
+        if path.suffix.lower() != ".npz":
+            raise FileFormatError(f"{path}: loops and forms are written as .npz")
         surface = self.surface
         arrays: dict[str, NDArray[Any]] = {"V": surface.V, "F": surface.F, "edges": surface.edges}
         arrays["dual_forms"] = self.dual_forms

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import as_reals, as_rows
 from ..errors import ArrayError, FileFormatError
 
 
@@ -66,14 +67,14 @@ def checked(data: Mapping[str, ArrayLike] | None, rows: int, what: str) -> dict[
         They are not.
     """
     arrays: dict[str, NDArray[Any]] = {}
-    for name, values in (data or {}).items():
-        array = np.asarray(values)
-        if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or len(array) != rows:
-            raise ArrayError(
-                f"{what}[{name!r}] must be numeric with {rows} rows, not {array.dtype} of shape "
-                f"{array.shape}"
-            )
-        arrays[name] = array
+    if data is None:
+        return arrays
+    if not isinstance(data, Mapping):
+        raise ArrayError(f"{what} must be a dict of arrays by name, not a {type(data).__name__}")
+    for name, values in data.items():
+        if not isinstance(name, str) or not name.isprintable() or not name.strip():
+            raise ArrayError(f"arrays in {what} are named by a word, not by {name!r:.60}")
+        arrays[name] = as_rows(values, f"{what}[{name!r}]", rows)
     return arrays
 
 
@@ -86,19 +87,14 @@ def checked_uv(
     ------
     FileFormatError
         The format has none.
-    ArrayError
+    ArrayError, NonFiniteError
         Not (m, 3, 2) finite numbers.
     """
     if corner_uv is None:
         return None
     if suffix != ".obj":
         raise FileFormatError(f"{suffix} files hold no texture coordinates; write an .obj")
-    uv = np.asarray(corner_uv, dtype=np.float64)
-    if uv.shape != (len(faces), 3, 2):
-        raise ArrayError(f"corner_uv must have shape ({len(faces)}, 3, 2), not {uv.shape}")
-    if not np.isfinite(uv).all():
-        raise ArrayError("corner_uv holds NaN or infinite values")
-    return uv
+    return as_reals(corner_uv, "corner_uv", (len(faces), 3, 2))
 
 
 def triangles_only(sizes: NDArray[Any]) -> None:

@@ -29,8 +29,9 @@ from typing import BinaryIO
 from numpy.typing import ArrayLike
 
 from ..base.files import atomic_path
+from ..base.options import as_path, flag
 from ..errors import FileFormatError, StretchmapError
-from ..mesh.given import as_solid, as_surface
+from ..mesh.given import as_mesh, as_solid, as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from .arrays import MeshArrays, checked, checked_uv
 from .meshio import read_meshio, write_meshio
@@ -98,6 +99,7 @@ def read(
     OSError
         The file cannot be opened.
     """
+    orient, compact = flag("orient", orient), flag("compact", compact)
     arrays = read_arrays(path)
     make = TriMesh if arrays.T is None else TetMesh
     mesh: TriMesh | TetMesh = make(arrays.V, arrays.elements, orient=orient)
@@ -151,7 +153,7 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
     FileFormatError, MissingDependencyError, OSError
         As for `read`.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = _known_suffix(path, {".npz", *_READERS, *_MESHIO})
     with open(path, "rb") as file:
         if not file.read(1):
@@ -197,7 +199,7 @@ def write(
     OSError
         The file cannot be written.
     """
-    path = Path(path)
+    path, mesh = as_path(path), as_mesh(mesh)
     suffix = _known_suffix(path, {".npz", *_WRITERS, *_MESHIO})
     if not path.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "no such folder", str(path.parent))

@@ -62,8 +62,7 @@ class Located:
         ArrayError, IndexRangeError, NonFiniteError
             No such arrays, or too few tets for the points that were found in them.
         """
-        shape = (None,) if np.ndim(values) != 2 else (None, None)
-        reals = as_reals(values, "values", shape)
+        reals = as_reals(values, "values", (None,), (None, None))
         tets = as_indices(T, 4, len(reals), "T")
         if self.tets.max(initial=-1) >= len(tets):
             raise ArrayError(

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import io
 from ..base.arrays import read_only
 from ..base.files import atomic_path
+from ..base.options import as_path
 from ..base.tables import HasSummary, plain_dict, table, versions
 from ..base.torus import TWO_PI, Torus
 from ..errors import OptionError
@@ -272,7 +273,7 @@ class MapResult(HasSummary):
         OSError
             If the file cannot be written.
         """
-        path = Path(path)
+        path = as_path(path)
         suffix = path.suffix.lower()
         mesh, d = self.mesh, self.distortion
         if suffix == ".npz":

@@ -125,7 +125,8 @@ def distortion(
         torus. Ignored for a solid.
     angles : array_like, shape (n, 2), optional
         For a surface, instead of ``torus``: chart coordinates (u, v) in radians; faces count as
-        flipped where they are negative in the chart, each edge taken the short way round.
+        flipped where they are negative in the chart, each edge taken the short way round. Ignored
+        for a solid.
 
     Returns
     -------
@@ -154,6 +155,8 @@ def distortion(
     points = as_reals(image, "image", (len(mesh.V), 3))
     if torus is not None:
         instance("torus", torus, Torus, "Torus(R, r)")
+    if angles is not None:
+        angles = as_reals(angles, "angles", (len(mesh.V), 2))
     if isinstance(mesh, TetMesh):
         oriented = True
         elements = mesh.T
@@ -230,13 +233,13 @@ def _orientation(
     mesh: TriMesh,
     image: NDArray[np.float64],
     torus: Torus | None,
-    angles: ArrayLike | None,
+    angles: NDArray[np.float64] | None,
 ) -> NDArray[np.float64] | None:
     """(m,) +1, -1 or 0 per face, None without a reference."""
     if torus is not None and angles is not None:
         raise OptionError("give torus or angles as the reference of orientation, not both")
     if angles is not None:
-        return np.sign(chart_areas(mesh.F, as_reals(angles, "angles", (len(mesh.V), 2))))
+        return np.sign(chart_areas(mesh.F, angles))
     if torus is None:
         return None
     return np.sign(outward_areas(image, mesh.F, torus))

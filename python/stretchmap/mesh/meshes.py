@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from ..base.arrays import as_indices, as_points, read_only
+from ..base.options import flag
 from ..base.tables import html, table
 from .diagnosis import Diagnosis, diagnose_solid, diagnose_surface
 
@@ -92,7 +93,7 @@ class TriMesh(_Mesh):
         points = as_points(V, "V")
         faces = as_indices(F, 3, len(points), "F")
         n_turned = 0
-        if orient:
+        if flag("orient", orient):
             turn = _core.mesh.misoriented_faces(points, faces)
             n_turned = len(turn)
             faces = _turned(faces, turn)
@@ -267,7 +268,7 @@ class TetMesh(_Mesh):
         points = as_points(V, "V")
         tets = as_indices(T, 4, len(points), "T")
         n_turned = 0
-        if orient:
+        if flag("orient", orient):
             turn = _core.mesh.misoriented_tets(points, tets)
             n_turned = len(turn)
             tets = _turned(tets, turn)

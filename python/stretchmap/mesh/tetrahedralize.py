@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MissingDependencyError, OptionError, SolverError
+from ..base.options import real
+from ..errors import MissingDependencyError, SolverError
+from .given import as_surface
 from .meshes import TetMesh, TriMesh
 
 __all__ = ["tetrahedralize"]
@@ -44,8 +46,9 @@ def tetrahedralize(
     SolverError
         If the surface cannot be filled, as when it crosses itself, or was changed.
     """
-    if quality <= 1.0 or (max_volume is not None and max_volume <= 0.0):
-        raise OptionError("quality must be above 1 and max_volume positive")
+    surface, quality = as_surface(surface), real("quality", quality, above=1.0)
+    if max_volume is not None:
+        max_volume = real("max_volume", max_volume, above=0.0)
     if importlib.util.find_spec("tetgen") is None:
         raise MissingDependencyError(
             "filling a surface with tets needs tetgen: pip install 'stretchmap[mesh]'"

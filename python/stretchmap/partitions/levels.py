@@ -10,22 +10,33 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from .. import _core
+from ..base.arrays import as_reals
+from ..base.options import whole
 from ..base.torus import TWO_PI
-from ..errors import OptionError, SolverError
+from ..errors import MeshError, OptionError, SolverError
 from .cutting import Pieces
 
 
-def shares_of(fractions: int | Sequence[float]) -> NDArray[np.float64]:
-    """Shares of the volume, summing to 1, from a number of equal ones or from the shares."""
+def shares_of(fractions: int | Sequence[float], most: int) -> NDArray[np.float64]:
+    """Shares of the volume, summing to 1, from a number of equal ones or from the shares.
+
+    Raises
+    ------
+    OptionError
+        They are none, or more than ``most``.
+    """
     if isinstance(fractions, (int, np.integer)):
-        if fractions < 2:
-            raise OptionError(f"a partition has at least two parts, got {fractions}")
-        return np.full(fractions, 1.0 / fractions)
-    shares = np.array(fractions, float)
-    if shares.ndim != 1 or len(shares) < 2:
-        raise OptionError("fractions must be a number of parts or one share for each of them")
-    if not (np.isfinite(shares).all() and (shares > 0.0).all() and abs(shares.sum() - 1.0) < 1e-9):
-        raise OptionError(f"fractions must be positive and sum to 1, got {shares.tolist()}")
+        count = whole("the number of parts", fractions, 2, most)
+        return np.full(count, 1.0 / count)
+    try:
+        shares = as_reals(fractions, "fractions", (None,))
+    except MeshError as error:
+        raise OptionError(
+            f"fractions must be a number of parts or one share for each of them: {error}"
+        ) from None
+    whole("the number of parts", len(shares), 2, most)
+    if not ((shares > 0.0).all() and abs(shares.sum() - 1.0) < 1e-9):
+        raise OptionError(f"fractions must be positive and sum to 1, got {shares[:5].tolist()}")
     return np.asarray(shares / shares.sum())
 
 

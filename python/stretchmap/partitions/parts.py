@@ -18,6 +18,7 @@ the first by itself, and so on, so that every cell of a grid has the volume aske
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
-from ..base.options import real
+from ..base.options import flag, one_of, real, whole
 from ..base.tables import HasSummary, plain_dict, table
 from ..errors import OptionError
 from ..maps.given import as_map_of_solid, torus_of
@@ -40,6 +41,8 @@ from .levels import cut_nested, levels_of, shares_of
 __all__ = ["Coordinate", "Partition", "partition"]
 
 Coordinate = Literal["s", "u", "v"]
+
+_MOST_TURNS = 1e3  # radians a start may be away from zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,20 +112,24 @@ class Partition(HasSummary):
         return self.part(i).surface
 
     def interface(self, i: int, j: int) -> TriMesh:
-        """Faces that parts i and j share, looking out of part i; raises as `part`."""
+        """Faces that parts i and j share, looking out of part i.
+
+        Raises
+        ------
+        OptionError
+            If there is no such part, or they have no face in common.
+        """
         first, second = (self._faces(p) for p in (i, j))
         keys = [
             np.sort(f, axis=1) @ (self.solid.n_vertices ** np.arange(3)) for f in (first, second)
         ]
         shared = np.isin(keys[0], keys[1])
         if not shared.any():
-            return TriMesh(self.solid.V, np.zeros((0, 3), np.int32))
+            raise OptionError(f"parts {i} and {j} have no face in common")
         return TriMesh(self.solid.V, first[shared]).compact()[0]
 
     def _tets(self, i: int) -> NDArray[np.bool_]:
-        if not 0 <= i < self.n_parts:
-            raise OptionError(f"there are parts 0 to {self.n_parts - 1}, not {i}")
-        return np.asarray(self.labels == i)
+        return np.asarray(self.labels == whole("the number of a part", i, 0, self.n_parts - 1))
 
     def _faces(self, i: int) -> NDArray[np.int64]:
         tets = np.ascontiguousarray(self.solid.T[self._tets(i)])
@@ -171,16 +178,21 @@ class Partition(HasSummary):
 def _asked(
     fractions: int | Sequence[float] | Sequence[int | Sequence[float]],
     by: Coordinate | Sequence[Coordinate],
+    most: int,
 ) -> tuple[tuple[Coordinate, ...], list[NDArray[np.float64]]]:
-    """Coordinates and the shares along each."""
-    axes = (by,) if isinstance(by, str) else tuple(by)
-    if not axes or len(set(axes)) != len(axes) or not set(axes) <= set(get_args(Coordinate)):
+    """Coordinates and the shares along each, with ``most`` cells at most."""
+    single = isinstance(by, str)
+    if not (single or isinstance(by, (tuple, list))):
+        raise OptionError("by must be 's', 'u' or 'v', or a tuple of them")
+    axes = tuple(one_of("by", axis, get_args(Coordinate)) for axis in ((by,) if single else by))
+    if not axes or len(set(axes)) != len(axes):
         raise OptionError(f"by must name each of 's', 'u', 'v' at most once, got {by!r}")
-    single = isinstance(by, str) or isinstance(fractions, int)
-    wanted: Any = (fractions,) if single else fractions
-    if len(wanted) != len(axes):
-        raise OptionError(f"{len(axes)} coordinates need as many fractions, got {len(wanted)}")
-    return axes, [shares_of(entry) for entry in wanted]
+    wanted: Any = (fractions,) if single or isinstance(fractions, (int, np.integer)) else fractions
+    if not isinstance(wanted, (tuple, list)) or len(wanted) != len(axes):
+        raise OptionError(f"{len(axes)} coordinates need a tuple of as many fractions")
+    shares = [shares_of(entry, most) for entry in wanted]
+    whole("the number of cells", math.prod(map(len, shares)), 2, most)
+    return axes, shares
 
 
 def partition(
@@ -222,9 +234,9 @@ def partition(
     SolverError
         If the image has no volume to be divided.
     """
-    axes, shares = _asked(fractions, by)
-    start = real("start", start)
     mapped, source = as_map_of_solid(result, "a partition")
+    axes, shares = _asked(fractions, by, source.n_tets)
+    start, correct = real("start", start, -_MOST_TURNS, _MOST_TURNS), flag("correct", correct)
     pieces = Pieces.of(source, mapped.image, torus_of(mapped))
     uncorrected = [
         levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)

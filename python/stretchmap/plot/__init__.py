@@ -11,10 +11,11 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.options import as_path, one_of, real
 from ..errors import FileFormatError, OptionError
+from ..maps.given import as_map
 from ..maps.result import Kind, MapResult
 from ..mesh.meshes import TetMesh
 from .comparisons import comparison
@@ -62,6 +63,7 @@ def kinds(result: MapResult) -> tuple[Kind, ...]:
     ----------
     result : MapResult
     """
+    result = as_map(result)
     solid, torus = isinstance(result.mesh, TetMesh), result.torus is not None
     lacking: dict[Kind, bool] = {
         "checkerboard": not torus,
@@ -92,8 +94,7 @@ def picture(result: MapResult, kind: Kind, **options: Any) -> Figure:
     MeshError, OptionError
         As the function.
     """
-    if kind not in KINDS:
-        raise OptionError(f"unknown kind of picture {kind!r}; known are {', '.join(KINDS)}")
+    one_of("kind", kind, tuple(KINDS))
     for option in options:
         if option not in inspect.signature(KINDS[kind]).parameters:
             raise OptionError(f"a picture of kind {kind!r} has no option {option!r}")
@@ -109,10 +110,12 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> No
     path : path-like
         ``.png``, ``.pdf`` or ``.svg``.
     dpi : float
-        Dots per inch.
+        Dots per inch, at most 2400.
 
     Raises
     ------
+    OptionError
+        It is no figure, or the resolution out of range.
     FileFormatError
         Another suffix.
     OSError
@@ -120,7 +123,9 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> No
     """
     from ..base.files import atomic_path
 
-    path = Path(path)
+    path, dpi = as_path(path), real("dpi", dpi, 1.0, 2400.0)
+    if not callable(getattr(figure, "savefig", None)):
+        raise OptionError(f"a matplotlib Figure is saved here, not a {type(figure).__name__}")
     if path.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise FileFormatError(f"{path}: pictures are .png, .pdf or .svg")
     with atomic_path(path) as temporary:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.options import instance
 from ..certificate.comparison import Comparison
 from ..mesh.meshes import TetMesh
 from .style import BLACK, BLUE, empty_figure
@@ -35,6 +36,7 @@ def comparison(found: Comparison) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
+    instance("found", found, Comparison, "see stretchmap.compare")
     names = list(found.distortion)
     figure = empty_figure(7.0, 1.0 + 1.3 * len(names))
     bins = np.linspace(*_RANGE, 101)

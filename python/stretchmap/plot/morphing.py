@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from .. import _core, io
 from ..base.arrays import read_only
 from ..base.files import atomic_path
+from ..base.options import as_path, flag, whole
 from ..base.tables import HasSummary, plain_dict, table
 from ..errors import FileFormatError, OptionError
+from ..maps.given import as_map_of_solid
 from ..mesh.meshes import TetMesh
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Morph", "morph"]
 
+_MOST_FRAMES = 10_000
 _COLLECTION = """<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1">
   <Collection>
@@ -56,8 +59,14 @@ class Morph(HasSummary):
     flips: NDArray[np.intp]
 
     def frame(self, i: int) -> NDArray[np.float64]:
-        """(n, 3) vertices of frame i."""
-        t = self.times[i]
+        """(n, 3) vertices of frame i.
+
+        Raises
+        ------
+        OptionError
+            There is no such frame.
+        """
+        t = self.times[whole("the number of a frame", i, 0, len(self.times) - 1)]
         return np.asarray((1.0 - t) * self.solid.V + t * self.image)
 
     def to_dict(self) -> dict[str, Any]:
@@ -85,7 +94,7 @@ class Morph(HasSummary):
         OSError
             If a file cannot be written.
         """
-        path = Path(path)
+        path = as_path(path)
         suffix = path.suffix.lower()
         if suffix == ".pvd":
             return self._save_frames(path)
@@ -145,7 +154,7 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
     result : Registration, VolumeMap or LoadedMap
         Map of a solid.
     frames : int
-        Number of frames, both ends included, at least 2.
+        Number of frames, both ends included, from 2 to 10,000.
     align : bool
         Turn, shift and scale the image onto the source first (least squares, no reflection); else
         the solid travels and turns on its way.
@@ -157,13 +166,12 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
     Raises
     ------
     OptionError
-        Fewer than two frames, the map of a surface, or an image that is a single point.
+        Too few or too many frames, or an image that is a single point.
+    KindError
+        It is no map, or the map of a surface.
     """
-    solid = result.mesh
-    if not isinstance(solid, TetMesh):
-        raise OptionError("only the map of a solid can be morphed, this is that of a surface")
-    if frames < 2:
-        raise OptionError(f"a morph has at least two frames, got {frames}")
+    result, solid = as_map_of_solid(result, "a morph")
+    frames, align = whole("frames", frames, 2, _MOST_FRAMES), flag("align", align)
     image = np.asarray(result.image)
     if not np.ptp(image, axis=0).any():
         raise OptionError("the image is a single point")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import OptionError
+from ..maps.given import as_map
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .painting import Array, Scene
@@ -47,6 +48,7 @@ def registration(result: MapResult) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
+    result = as_map(result)
     solid, target = result.mesh, result.target
     if target is None or not isinstance(solid, TetMesh):
         raise OptionError("this picture needs a registration; the map has no target solid")

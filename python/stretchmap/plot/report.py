@@ -7,13 +7,14 @@ import html
 import io
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.files import atomic_path
+from ..base.options import as_path
 from ..base.tables import cell
 from ..certificate.checks import certify
 from ..errors import StretchmapError
+from ..maps.given import as_map
 from ..maps.result import MapResult
 
 if TYPE_CHECKING:
@@ -86,8 +87,9 @@ def write_report(result: MapResult, path: str | os.PathLike[str], source: str = 
     OSError
         The file cannot be written.
     """
+    result, path = as_map(result), as_path(path)
     text = _page(result, source)
-    with atomic_path(Path(path)) as temporary:
+    with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

@@ -8,15 +8,17 @@ alone.
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.files import atomic_path
-from ..errors import ArrayError, FileFormatError, MissingDependencyError, OptionError
+from ..base.options import as_path, one_of
+from ..errors import FileFormatError, MissingDependencyError
+from ..maps.given import as_map_of_solid
 from ..maps.result import MapResult
+from ..mesh.given import as_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .solids import Color
 from .style import principal
@@ -56,10 +58,8 @@ def cut(
     MissingDependencyError
         PyVista is not installed.
     """
-    if not isinstance(result.mesh, TetMesh):
-        raise ArrayError("a cut needs the map of a solid, this is one of a surface")
-    if color not in _COLORS:
-        raise OptionError(f"color must be one of {', '.join(_COLORS)}, got {color!r}")
+    result, _ = as_map_of_solid(result, "a cut")
+    one_of("color", color, tuple(_COLORS))
     pv = _pyvista()
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: result.mesh.T}, np.asarray(result.image))
     place = principal(result.mesh.V, result.mesh.V)[:, 0]
@@ -100,6 +100,7 @@ def loops(mesh: TriMesh | TetMesh, *, off_screen: bool = True) -> pyvista.Plotte
     """
     from ..homology.basis import homology_basis
 
+    mesh = as_mesh(mesh)
     pv = _pyvista()
     solid = mesh if isinstance(mesh, TetMesh) else None
     surface = mesh.surface if isinstance(mesh, TetMesh) else mesh
@@ -135,7 +136,7 @@ def save(plotter: pyvista.Plotter, path: str | os.PathLike[str]) -> None:
     OSError
         The file cannot be written.
     """
-    path = Path(path)
+    path = as_path(path)
     if path.suffix.lower() != ".png":
         raise FileFormatError(f"{path}: scenes are saved as .png")
     with atomic_path(path) as temporary:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.options import one_of, real
 from ..base.torus import TWO_PI
-from ..errors import ArrayError, OptionError
+from ..maps.given import as_map_of_solid
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from ..partitions.parts import Coordinate, partition
@@ -57,10 +58,9 @@ def cutaway(result: MapResult, color: Color = "coordinate", opening: float = 0.3
     MissingDependencyError
         matplotlib is not installed.
     """
-    if not isinstance(result.mesh, TetMesh):
-        raise ArrayError("a cut-away needs the map of a solid, this is one of a surface")
-    if color not in ("coordinate", "ratio") or not 0.0 <= opening < 1.0:
-        raise OptionError("color must be 'coordinate' or 'ratio' and 0 <= opening < 1")
+    result, _ = as_map_of_solid(result, "a cut-away")
+    one_of("color", color, ("coordinate", "ratio"))
+    opening = real("opening", opening, 0.0, below=1.0)
     figure = empty_figure(9.6, 4.2)
     pieces = _Pieces.of(result)
     view = broad_view(result.mesh.V)
@@ -120,8 +120,8 @@ def levels(
     MissingDependencyError
         matplotlib is not installed.
     """
-    if by not in ("s", "u", "v") or not 0.0 <= opening < 1.0:
-        raise OptionError("by must be 's', 'u' or 'v' and 0 <= opening < 1")
+    one_of("by", by, ("s", "u", "v"))
+    opening = real("opening", opening, 0.0, below=1.0)
     figure = empty_figure(9.6, 4.9)
     from matplotlib.patches import Patch
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import OptionError
+from ..maps.given import as_map
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .painting import Array
@@ -37,6 +38,7 @@ def ratios(result: MapResult) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
+    result = as_map(result)
     figure = empty_figure(7.0, 4.2)
     after = result.distortion.ratios
     before, name = ratios_before(result)
@@ -82,7 +84,7 @@ def convergence(result: MapResult) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
-    history = result.history
+    history = as_map(result).history
     if not history:
         raise OptionError("this map has no history of iterations to be drawn")
     figure = empty_figure(7.4, 6.4)

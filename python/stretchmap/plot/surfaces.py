@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.options import pair
 from ..errors import OptionError
+from ..maps.given import as_map
 from ..maps.result import MapResult, corner_turns
+from ..mesh.given import as_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .painting import Array, Scene, View, subdivided
 from .style import (
@@ -28,6 +31,7 @@ from .style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_MOST_CELLS = 1000  # either way
 _FINE = 150_000  # pieces that make the outline of a checkerboard smooth
 
 
@@ -52,6 +56,7 @@ def domain(result: MapResult) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
+    result = as_map(result)
     figure = empty_figure(7.6, 4.6)
     from matplotlib.collections import PolyCollection
 
@@ -112,8 +117,10 @@ def checkerboard(result: MapResult, cells: tuple[int, int] = (24, 8)) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
-    if any(number < 2 or number % 2 for number in cells):
-        raise OptionError(f"cells must be positive and even, got {cells}")
+    result = as_map(result)
+    cells = pair("cells", cells, 2, _MOST_CELLS)
+    if cells[0] % 2 or cells[1] % 2:
+        raise OptionError(f"cells must be even, got {cells}")
     figure = empty_figure(9.6, 4.6)
     surface, image = boundary(result)
     turns = corner_turns(surface.F, torus_angles(result, image)) * cells
@@ -155,12 +162,12 @@ def loops(result: MapResult | TriMesh | TetMesh) -> Figure:
     MissingDependencyError
         matplotlib is not installed.
     """
+    mesh = as_mesh(result.mesh if isinstance(result, MapResult) else result, "result")
     figure = empty_figure(6.4, 4.8)
     from matplotlib.lines import Line2D
 
     from ..homology.basis import homology_basis
 
-    mesh = result.mesh if isinstance(result, MapResult) else result
     solid = mesh if isinstance(mesh, TetMesh) else None
     surface = mesh.surface if isinstance(mesh, TetMesh) else mesh
     basis = homology_basis(surface, solid)

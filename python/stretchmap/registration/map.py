@@ -19,12 +19,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
 from ..base.arrays import read_only
+from ..base.options import SOLVERS, callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate
-from ..errors import ArrayError, CertificationError, OptionError, SolverError
+from ..errors import ArrayError, CertificationError, SolverError
 from ..maps.history import IterationRecord
 from ..maps.result import MapResult
+from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement, refine_overconstrained
 from ..volume.flip_free import FlipFreeSolver
@@ -181,10 +183,14 @@ def register(
     one that fits them best is taken; else the one in which the two surfaces differ least from
     similar shapes (rotation, translation, scale). Reflections are never used.
     """
-    if landmark_map not in ("smooth", "affine"):
-        raise OptionError(f"landmark_map must be 'smooth' or 'affine', got {landmark_map!r}")
-    if max_iter < 0 or not tol >= 0.0:
-        raise OptionError(f"max_iter and tol must not be negative, got {max_iter} and {tol}")
+    source, target = as_solid(source, "source"), as_solid(target, "target")
+    one_of("landmark_map", landmark_map, ("smooth", "affine"))
+    max_iter, tol = whole("max_iter", max_iter, 0), real("tol", tol, 0.0)
+    one_of("solver", solver, SOLVERS)
+    keep_best = flag("keep_best", keep_best)
+    callback("progress", progress)
+    if options is not None:
+        instance("options", options, FlipFreeOptions, "stretchmap.FlipFreeOptions(...)")
     for mesh in (source, target):
         mesh.require_solid_torus()
     marks = _landmarks(landmarks, source, target)
@@ -212,7 +218,9 @@ def _landmarks(given: Any, source: TetMesh, target: TetMesh) -> Landmarks:
         none = np.zeros(0, np.int32)
         return Landmarks(none, none, np.zeros((0, 2)))
     if isinstance(given, Landmarks):
-        return Landmarks.of(source, target, given.source, given.target) if len(given) else given
+        if len(given):
+            Landmarks.of(source, target, given.source, given.target)  # of these two solids
+        return given
     if isinstance(given, (str, os.PathLike)):
         return read_landmarks(given, source, target)
     if not (isinstance(given, (tuple, list)) and len(given) == 2):

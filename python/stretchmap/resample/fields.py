@@ -75,7 +75,7 @@ def transfer(
         if len(flat):
             raise DegenerateError(f"{len(flat)} tets of the {name} have no positive volume", flat)
     count = solid.n_vertices if per == "vertex" else solid.n_tets
-    field = as_reals(values, "values", (count, None) if np.ndim(values) == 2 else (count,))
+    field = as_reals(values, "values", (count,), (count, None))
     columns = field.reshape(count, -1)
     # A power of two, so that no sum overflows and nothing is rounded.
     unit = np.ldexp(1.0, np.frexp(np.abs(columns).max(initial=0.0))[1] - 1)

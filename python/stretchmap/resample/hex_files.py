@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.files import atomic_path
-from ..base.options import file_path
+from ..base.options import as_path
 from ..errors import FileFormatError, MissingDependencyError
 
 __all__ = ["HEX_SUFFIXES", "write_hexahedra"]
@@ -56,7 +56,7 @@ def write_hexahedra(
     OSError
         If the file cannot be written.
     """
-    path = Path(file_path(path))
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix in _BY_MESHIO:
         _write_by_meshio(path, V, H, point_fields, cell_fields)

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from .. import _core
 from ..base.arrays import read_only
-from ..base.options import flag, memory, whole
+from ..base.options import callback, flag, memory, whole
 from ..base.progress import Progress
 from ..base.torus import TWO_PI, Torus
 from ..errors import SolverError
@@ -95,6 +95,7 @@ def hex_mesh(
     count = sections * block * (block + 4 * rings)
     memory(f"a grid of {count} hexahedra", _BYTES_PER_HEX * count)
     repair = flag("repair", repair)
+    callback("progress", progress)
     points = result.point_map
     layout = swept_layout(sections, block, rings)
     H, rim, u, v = layout.H, layout.boundary, layout.u, layout.v

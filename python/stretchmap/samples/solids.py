@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.options import memory, pair, real, whole
 from ..base.torus import TWO_PI, Torus
 from ..errors import OptionError
 from ..mesh.meshes import TetMesh
@@ -31,6 +32,10 @@ __all__ = [
     "solid_torus",
     "tetrahedralize",
 ]
+
+
+_MOST_WINDINGS = 100  # more than a mesh of any size shows
+_BYTES_PER_CELL = 1500
 
 
 def solid_torus(n_tets: int = 20_000, R: float = 3.0, r: float = 1.0) -> TetMesh:
@@ -78,9 +83,8 @@ def bumpy_torus(
         If the parameters do not make a solid torus.
     """
     torus = Torus(R, r)
-    if not 0.0 <= amplitude < min(1.0, torus.ratio - 1.0):
-        raise OptionError(f"amplitude must be in [0, min(1, R/r - 1)), got {amplitude}")
-    a, b = waves
+    amplitude = real("amplitude", amplitude, 0.0, below=min(1.0, torus.ratio - 1.0))
+    a, b = pair("waves", waves, 0, _MOST_WINDINGS)
     return swept(
         n_tets,
         TWO_PI * R / r,
@@ -109,6 +113,7 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
         If p, q are not coprime or the tube would touch itself; the message names the largest
         radius.
     """
+    p, q = (whole(name, x, 1, _MOST_WINDINGS) for name, x in (("p", p), ("q", q)))
     if math.gcd(p, q) != 1:
         raise OptionError(f"({p}, {q}) is not a knot: the numbers must be coprime")
 
@@ -118,8 +123,7 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
     dense = curve(np.linspace(0.0, 1.0, 2001))
     length = float(np.linalg.norm(np.diff(dense, axis=0), axis=1).sum())
     room = least_distance_of_strands(dense[:-1:4], length)
-    if not 0.0 < radius < 0.45 * room:
-        raise OptionError(f"radius must be positive and below {0.45 * room:.3g}, got {radius}")
+    radius = real("radius", radius, above=0.0, below=0.45 * room)
 
     def embed(turns: Array, x: Array, y: Array) -> Array:
         centers = curve(turns[:, 0])
@@ -135,9 +139,11 @@ def ball(n: int = 6) -> TetMesh:
     Raises
     ------
     OptionError
-        If ``n < 1``.
+        If ``n < 1``, or there is not the memory.
     """
-    V, T = _cells(np.ones((2 * _at_least_one(n),) * 3, bool))
+    n = whole("n", n, 1)
+    memory(f"a mesh of {48 * n**3} tets", _BYTES_PER_CELL * 8 * n**3)
+    V, T = _cells(np.ones((2 * n,) * 3, bool))
     V = V / n - 1.0
     # Each cube shell goes to the sphere of the same size.
     size = np.abs(V).max(axis=1, keepdims=True)
@@ -159,7 +165,9 @@ def solid_double_torus(n: int = 2) -> TetMesh:
     """
     plate = np.ones((5, 3, 1), bool)
     plate[[1, 3], 1] = False
-    cells = plate.repeat(_at_least_one(n), 0).repeat(n, 1).repeat(n, 2)
+    n = whole("n", n, 1)
+    memory(f"a mesh of {78 * n**3} tets", _BYTES_PER_CELL * 13 * n**3)
+    cells = plate.repeat(n, 0).repeat(n, 1).repeat(n, 2)
     V, T = _cells(cells)
     return TetMesh(V / n, T)
 
@@ -172,12 +180,6 @@ def _revolved(torus: Torus, scale: Callable[[Array, Array], Array]) -> Embedding
         return torus.xi(u, v, torus.r * np.hypot(x, y) * scale(u, v))
 
     return embed
-
-
-def _at_least_one(n: int) -> int:
-    if n < 1:
-        raise OptionError(f"n must be at least 1, got {n}")
-    return n
 
 
 def _cells(cells: NDArray[np.bool_]) -> tuple[Array, NDArray[np.intp]]:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.options import memory, whole
 from ..base.torus import TWO_PI, Torus
-from ..errors import OptionError
 from ..mesh.meshes import TriMesh
 from .solids import ball, solid_double_torus
 
 __all__ = ["double_torus", "sphere", "torus_surface"]
+
+
+_BYTES_PER_VERTEX = 400  # at the peak
 
 
 def torus_surface(nu: int = 60, nv: int = 20, R: float = 3.0, r: float = 1.0) -> TriMesh:
@@ -28,8 +31,8 @@ def torus_surface(nu: int = 60, nv: int = 20, R: float = 3.0, r: float = 1.0) ->
     OptionError
         If there are fewer than three vertices either way or the radii do not make a torus.
     """
-    if nu < 3 or nv < 3:
-        raise OptionError(f"a torus needs at least 3 vertices either way, got {nu} and {nv}")
+    nu, nv = whole("nu", nu, 3), whole("nv", nv, 3)
+    memory(f"a mesh of {2 * nu * nv} faces", _BYTES_PER_VERTEX * nu * nv)
     i, j = (index.ravel() for index in np.indices((nu, nv)))
     a, b = i * nv + j, (i + 1) % nu * nv + j
     c, d = (i + 1) % nu * nv + (j + 1) % nv, i * nv + (j + 1) % nv

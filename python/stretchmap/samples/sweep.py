@@ -13,9 +13,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.options import memory, whole
 from ..base.torus import TWO_PI
-from ..errors import OptionError
 from ..mesh.meshes import TetMesh
+
+_BYTES_PER_TET = 150  # at the peak
 
 Array = NDArray[np.float64]
 # Stations (m, 1) in turns and section points (1, p) in the unit disk -> points (m, p, 3).
@@ -29,8 +31,8 @@ def swept(n_tets: int, slenderness: float, embed: Embedding) -> TetMesh:
 
 def resolution(n_tets: int, slenderness: float, multiple: int = 1) -> tuple[int, int]:
     """Rings n and stations m with 18 n^2 m close to n_tets and cells about as long as wide."""
-    if n_tets < 300:
-        raise OptionError(f"a sweep has at least 300 tets, got n_tets = {n_tets}")
+    n_tets = whole("n_tets", n_tets, 300)
+    memory(f"a mesh of {n_tets} tets", _BYTES_PER_TET * n_tets)
     n = max(1, round((n_tets / (18.0 * slenderness)) ** (1.0 / 3.0)))
     m = max(1, round(n_tets / (18.0 * n * n * multiple))) * multiple
     return n, max(m, 6)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.options import pair, whole
 from ..base.torus import TWO_PI
-from ..errors import OptionError
 from ..mesh.meshes import TetMesh
 from .sweep import (
     Array,
@@ -40,8 +40,10 @@ def vertebra_like(n_tets: int = 40_000, seed: int | None = None) -> TetMesh:
     Raises
     ------
     OptionError
-        If fewer than 300 tets are asked for.
+        If fewer than 300 tets are asked for, or the seed is no integer from 0.
     """
+    if seed is not None:
+        seed = whole("seed", seed, 0)
     return swept(n_tets, 22.0, _vertebra(seed))
 
 
@@ -86,11 +88,11 @@ def vertebra_pair(
     Raises
     ------
     OptionError
-        If the number of landmarks or of tets is out of range.
+        If the number of landmarks or of tets, or the seed, is out of range.
     """
     stations, sixths = 12, 6
-    if not 0 <= n_landmarks <= stations * sixths:
-        raise OptionError(f"n_landmarks must be from 0 to {stations * sixths}, got {n_landmarks}")
+    n_landmarks = whole("n_landmarks", n_landmarks, 0, stations * sixths)
+    seed, n_tets = whole("seed", seed, 0, 2**30), pair("n_tets", n_tets, 300)
     individuals = [_vertebra(2 * seed), _vertebra(2 * seed + 1)]
     sizes = [resolution(count, 22.0, stations) for count in n_tets]
     source, target = (sweep(n, m, embed) for (n, m), embed in zip(sizes, individuals, strict=True))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,10 +67,10 @@ def test_words_flags_and_objects():
 
 
 def test_paths():
-    assert options.file_path("a.npz") == "a.npz"
-    for bad in (0, None, b"a.npz", "a\0.npz", 1.5, ["a"]):
-        with pytest.raises(FileFormatError):
-            options.file_path(bad)
+    assert options.as_path("a.npz") == options.as_path(Path("a.npz")) == Path("a.npz")
+    for bad in (0, None, b"a.npz", "a\0.npz", "", "\ud800.npz", 1.5, ["a"], Awkward()):
+        with pytest.raises(FileFormatError, match="named by a path"):
+            options.as_path(bad)
 
 
 def test_memory_that_is_not_there():

@@ -269,7 +269,7 @@ def test_opposite_views_see_opposite_sides():
 
 
 def test_wrong_requests_are_refused(volume, area, tmp_path):
-    with pytest.raises(OptionError, match="known are"):
+    with pytest.raises(OptionError, match="kind must be 'checkerboard'"):
         plot.picture(volume, "portrait")
     with pytest.raises(ArrayError, match="solid"):
         plot.cutaway(area)

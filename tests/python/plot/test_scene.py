@@ -62,7 +62,7 @@ def test_wrong_requests_are_refused(area, monkeypatch):
     with pytest.raises(ArrayError, match="solid"):
         scene.cut(area)
     solid = sm.volume_map(samples.bumpy_torus(1500), c=1, max_iter=0)
-    with pytest.raises(OptionError, match="coordinate, ratio"):
+    with pytest.raises(OptionError, match="'coordinate' or 'ratio'"):
         scene.cut(solid, "red")
     with pytest.raises(FileFormatError, match=r"\.png"):
         scene.save(None, "x.jpg")
