@@ -41,5 +41,5 @@ def test_names_of_a_user_do_not_become_markup():
 def test_a_map_draws_itself(result):
     pytest.importorskip("matplotlib")
     assert result.plot("ratios").axes
-    with pytest.raises(OptionError, match="unknown kind"):
+    with pytest.raises(OptionError, match="kind must be"):
         result.plot("portrait")

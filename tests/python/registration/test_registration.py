@@ -375,3 +375,16 @@ def test_faces_cut_along_the_target_end_on_its_surface():
 def test_crossing_faces_are_cut_along_the_target_where_following_it_fails(monkeypatch):
     monkeypatch.setattr(_embed, "_PATIENCE", 0)  # do not even try
     test_a_boundary_image_that_crosses_itself_is_refined()
+
+
+def test_a_landmark_far_from_the_surface_is_refused_with_its_distance():
+    solid = samples.solid_torus(400)
+    near = solid.V[solid.boundary_vertices[:2]] * 1.01
+    far = near + [[0.0, 0.0, 1e9], [0.0, 0.0, 0.0]]
+    with pytest.raises(LandmarkError, match=r"landmark 0 lies 1e\+09 from .* of the source") as e:
+        Landmarks.of(solid, solid, far, near)
+    assert e.value.ids == (0,)
+    assert Landmarks.of(solid, solid, near, near).snapped.max() < 0.1
+    with pytest.raises(LandmarkError, match=r"at most 0.001 of that"):
+        Landmarks.of(solid, solid, near, near, within=1e-3)
+    assert len(Landmarks.of(solid, solid, far, near, within=1e12)) == 2
