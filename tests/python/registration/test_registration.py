@@ -380,7 +380,7 @@ def test_crossing_faces_are_cut_along_the_target_where_following_it_fails(monkey
 def test_a_landmark_far_from_the_surface_is_refused_with_its_distance():
     solid = samples.solid_torus(400)
     near = solid.V[solid.boundary_vertices[:2]] * 1.01
-    far = near + [[0.0, 0.0, 1e9], [0.0, 0.0, 0.0]]
+    far = near + np.array([[0.0, 0.0, 1e9], [0.0, 0.0, 0.0]])
     with pytest.raises(LandmarkError, match=r"landmark 0 lies 1e\+09 from .* of the source") as e:
         Landmarks.of(solid, solid, far, near)
     assert e.value.ids == (0,)
