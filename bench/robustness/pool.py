@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -23,7 +24,7 @@ _SLACK = 40.0
 
 
 def run_process(command: list[str], threads: int, timeout: float) -> tuple[int, str]:
-    """Exit code (negative: the signal) and the last line of complaint."""
+    """Exit code (negative: the signal) and the line of the exception it ended with."""
     env = os.environ | {"OMP_NUM_THREADS": str(threads)}
     # A session of its own, so that the helpers a task starts end with it.
     process = subprocess.Popen(
@@ -39,7 +40,10 @@ def run_process(command: list[str], threads: int, timeout: float) -> tuple[int, 
     except BaseException:
         os.killpg(process.pid, signal.SIGKILL)
         raise
-    return process.returncode, (complaint.strip().splitlines() or [""])[-1]
+    lines = complaint.strip().splitlines() or [""]
+    # The text of an exception may go on over several lines, indented ones most of all.
+    named = [line for line in lines if re.match(r"[\w.]*(Error|Exception|Rejected)\b", line)]
+    return process.returncode, (named or lines)[-1]
 
 
 def mesh_ready(case: Case) -> str:
@@ -55,13 +59,15 @@ def mesh_ready(case: Case) -> str:
     return "" if code == 0 else f"not drawn: {complaint}"
 
 
-def failure(job: dict[str, Any], code: int, complaint: str) -> dict[str, Any]:
-    """The record of a process that left none."""
-    killed = code in (-signal.SIGXCPU, -signal.SIGKILL, -signal.SIGALRM)
-    if killed:
-        reason = complaint or f"killed at {1e3 * job['per_element']:g} ms of processor per element"
-    else:
-        reason = f"the process ended with {code}: {complaint}"
+def ending(job: dict[str, Any], code: int, complaint: str) -> str:
+    """Why a process left no record."""
+    if code in (-signal.SIGXCPU, -signal.SIGKILL):
+        return f"killed at {1e3 * job['per_element']:g} ms of processor time per element"
+    return complaint if code == -signal.SIGALRM else f"ended with {code}: {complaint}"
+
+
+def unfinished(job: dict[str, Any], reason: str, killed: bool = False) -> dict[str, Any]:
+    """The record of a case that was not mapped."""
     kept = {key: job[key] for key in ("kind", "group", "name", "seed", "size")}
     return {**kept, "certified": False, "converged": False, "reason": reason, "killed": killed}
 
@@ -73,15 +79,17 @@ def run_case(case: Case, job: dict[str, Any], threads: int, script: Path) -> dic
         return json.loads(record.read_text())
     record.parent.mkdir(parents=True, exist_ok=True)
     complaint = mesh_ready(case)
+    if not complaint and job.get("guide") and not Path(job["guide"]).exists():
+        complaint = "there is no map without landmarks to place them by"
     if complaint:
-        found = failure(job, 1, complaint)
-        write_json(record, found)
-        return found
+        write_json(record, unfinished(job, complaint))
+        return json.loads(record.read_text())
     size = case.path.stat().st_size / 40.0  # about the number of elements, for the clock's limit
     timeout = 120.0 + _SLACK * job["per_element"] * max(size, 5_000.0)
     code, complaint = run_process([sys.executable, str(script), json.dumps(job)], threads, timeout)
     if not record.exists():
-        write_json(record, failure(job, code, complaint))
+        killed = code in (-signal.SIGXCPU, -signal.SIGKILL, -signal.SIGALRM)
+        write_json(record, unfinished(job, ending(job, code, complaint), killed))
     return json.loads(record.read_text())
 
 

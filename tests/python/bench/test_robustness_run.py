@@ -78,6 +78,24 @@ def test_who_exceeds_the_limit_is_killed_and_recorded(folder: Path) -> None:
     assert record["killed"] and not record["certified"] and "1 ms" in record["reason"]
 
 
+def test_a_crash_is_recorded_by_its_exception(folder: Path) -> None:
+    import pool
+    from cases import Case
+
+    script = folder / "crash.py"
+    script.write_text("raise ValueError('no\\n  [1, 2]')\n")
+    case = Case("set", "a", folder / "set" / "a.npz")
+    job: dict[str, Any] = {"kind": "volume", "group": "set", "name": "a", "seed": None, "size": 1.0}
+    job |= {"mesh": str(case.path), "record": str(folder / "a.json"), "per_element": 1e-3}
+    [record] = pool.run_all([case], [job], processes=1, threads=1, script=script)
+    assert not record["killed"] and record["reason"] == "ended with 1: ValueError: no"
+    absent = Case("set", "b", folder / "absent.npz")
+    [record] = pool.run_all(
+        [absent], [job | {"record": str(folder / "b.json")}], processes=1, threads=1
+    )
+    assert record["reason"] == "there is no such file"
+
+
 def test_the_quasi_isometry_constant_of_a_linear_map() -> None:
     from figures import quasi_isometry
 
