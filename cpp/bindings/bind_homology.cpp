@@ -26,11 +26,13 @@ void bind(py::module_& m) {
   m.def(
       "shortest_loop",
       [](const mesh::SurfaceTopology& top, const VecRef& length,
-         const Eigen::Ref<const IndexRows>& forms, const IndexVec& target, const Loop& crossing) {
-        return shortest_loop(top, length, forms, target, crossing, signal_poll());
+         const Eigen::Ref<const IndexRows>& forms, const IndexVec& target, const Loop& crossing,
+         double limit) {
+        return shortest_loop(top, length, forms, target, crossing, signal_poll(), limit);
       },
       py::arg("topology"), py::arg("edge_length"), py::arg("forms").noconvert(), py::arg("target"),
-      py::arg("crossing"), release_gil());
+      py::arg("crossing"), py::arg("limit") = std::numeric_limits<double>::infinity(),
+      release_gil());
   m.def(
       "solid_cohomology",
       [](const TetsRef& tets, const EdgesRef& edges, Index n_vertices,

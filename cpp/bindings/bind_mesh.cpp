@@ -1,6 +1,7 @@
 #include "arrays.hpp"
 #include "stretchmap/mesh/boundary_joins.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
+#include "stretchmap/mesh/fill_borders.hpp"
 #include "stretchmap/mesh/orient.hpp"
 #include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
@@ -105,6 +106,18 @@ void bind_boundary_joins(py::module_& m) {
       .def_readonly("joins", &Refinement::joins);
 }
 
+void bind_fill_borders(py::module_& m) {
+  py::class_<BorderFill>(m, "BorderFill")
+      .def(py::init([](const PointsRef& points, const SurfaceTopology& top) {
+             return fill_borders(points, top, signal_poll());
+           }),
+           py::arg("points").noconvert(), py::arg("topology"), release_gil())
+      .def_readonly("loops", &BorderFill::loops)
+      .def_readonly("faces", &BorderFill::faces)
+      .def_readonly("hole", &BorderFill::hole)
+      .def_readonly("centers", &BorderFill::centers);
+}
+
 }  // namespace
 
 void bind(py::module_& m) {
@@ -112,6 +125,7 @@ void bind(py::module_& m) {
   bind_sizes(m);
   bind_diagnosis(m);
   bind_boundary_joins(m);
+  bind_fill_borders(m);
 }
 
 }  // namespace stretchmap::mesh

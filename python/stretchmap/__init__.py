@@ -67,10 +67,14 @@ if TYPE_CHECKING:
     from .mesh.diagnosis import Diagnosis as Diagnosis
     from .mesh.meshes import TetMesh as TetMesh
     from .mesh.meshes import TriMesh as TriMesh
+    from .mesh.tetrahedralize import tetrahedralize as tetrahedralize
     from .partitions.parts import Partition as Partition
     from .partitions.parts import partition as partition
     from .plot.morphing import Morph as Morph
     from .plot.morphing import morph as morph
+    from .preparation.handles import HandleCut as HandleCut
+    from .preparation.pipeline import prepare as prepare
+    from .preparation.report import Preparation as Preparation
     from .registration.landmarks import Landmarks as Landmarks
     from .registration.landmarks import read_landmarks as read_landmarks
     from .registration.map import Registration as Registration
@@ -89,6 +93,7 @@ _EXPORTS = {
     "TetMesh": "mesh.meshes",
     "TriMesh": "mesh.meshes",
     "Diagnosis": "mesh.diagnosis",
+    "tetrahedralize": "mesh.tetrahedralize",
     "read": "io.read_write",
     "read_solid": "io.read_write",
     "read_surface": "io.read_write",
@@ -109,6 +114,9 @@ _EXPORTS = {
     "PointMap": "maps.points",
     "ConformalMap": "conformal.map",
     "conformal_map": "conformal.map",
+    "HandleCut": "preparation.handles",
+    "Preparation": "preparation.report",
+    "prepare": "preparation.pipeline",
     "Certificate": "certificate.findings",
     "certify": "certificate.checks",
     "certify_file": "certificate.checks",

@@ -7,8 +7,11 @@ namespace stretchmap::homology {
 
 CoverSearch::CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                          const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
-                         Poll poll)
-    : poll_(std::move(poll)), n_vertices_(top.n_vertices), start_(top.n_vertices + 1) {
+                         Poll poll, double limit)
+    : poll_(std::move(poll)),
+      n_vertices_(top.n_vertices),
+      start_(top.n_vertices + 1),
+      best_(limit) {
   const std::vector<Index> move = number_moves(forms);
   const Sheet there(target.data(), target.data() + target.size());
   forward_ = static_cast<Index>(moves_.size());

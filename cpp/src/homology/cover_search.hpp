@@ -19,7 +19,8 @@ namespace stretchmap::homology {
 class CoverSearch {
  public:
   CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_length,
-              const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target, Poll poll);
+              const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target, Poll poll,
+              double limit = std::numeric_limits<double>::infinity());
 
   // Looks for loops through vertex v shorter than `cutoff` and keeps the best of all searches.
   // Returns the length of the shortest through v, or the cutoff if that is less.
@@ -68,7 +69,7 @@ class CoverSearch {
   std::vector<std::vector<Index>> next_;  // (sheet, move) -> sheet, -1 where not yet known
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue_;
   Index origin_ = 0, stamp_ = 0, settled_ = 0;
-  double best_ = std::numeric_limits<double>::infinity();
+  double best_;
   double limit_ = 0.0;  // shortest loop through the current source so far, or its cutoff
   Loop loop_;
 };

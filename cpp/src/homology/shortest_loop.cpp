@@ -51,10 +51,11 @@ Loop shortest_through(const mesh::SurfaceTopology& top, const VecRef& edge_lengt
 
 Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                    const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
-                   const Loop& crossing, const Poll& poll) {
-  CoverSearch search(top, edge_length, forms, target, poll);
+                   const Loop& crossing, const Poll& poll, double limit) {
+  CoverSearch search(top, edge_length, forms, target, poll, limit);
+  const bool bounded = limit < std::numeric_limits<double>::infinity();
   Loop loop;
-  if (forms.rows() == 2) {
+  if (forms.rows() == 2 && !bounded) {
     search.search_from(crossing[0], std::numeric_limits<double>::infinity());
     loop = without_stem(search.loop());
     if (is_simple(loop)) {
@@ -64,6 +65,7 @@ Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
     }
   }
   if (loop.empty()) loop = shortest_through(top, edge_length, crossing, search);
+  if (loop.empty() && bounded) return loop;
   if (loop.empty()) {
     throw Error("SolverError", "no loop of the class crosses the loop given");
   }

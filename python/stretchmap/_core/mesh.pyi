@@ -2,7 +2,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BoundaryJoins', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
+__all__: list[str] = ['BorderFill', 'BoundaryJoins', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
 class SurfaceTopology:
     def __init__(self, faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
@@ -158,6 +158,21 @@ class Refinement:
         ...
     @property
     def tets(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]"]:
+        ...
+class BorderFill:
+    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], topology: SurfaceTopology) -> None:
+        ...
+    @property
+    def centers(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        ...
+    @property
+    def faces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
+        ...
+    @property
+    def hole(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        ...
+    @property
+    def loops(self) -> list[list[int]]:
         ...
 def edge_lengths(topology: SurfaceTopology, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...

@@ -1,4 +1,4 @@
-"""Commands about meshes: info, homology, tet."""
+"""Commands about meshes: info, homology, prepare, tet."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands of this module."""
     app.command()(info)
     app.command()(homology)
+    app.command()(prepare)
     app.command()(tet)
 
 
@@ -105,6 +106,65 @@ def homology(
         common.write_json(json, report)
     else:
         common.write_together(output, basis.save, json, report)
+
+
+def prepare(
+    raw: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RAW",
+            help="Surface, whatever its defects; or a voxel mask: .npy, .npz with one "
+            "3-dimensional array and optionally spacing, .nii, .nii.gz.",
+            show_default=False,
+        ),
+    ],
+    output: Output,
+    faces: Annotated[int, typer.Option(help="Boundary faces aimed at.")] = 8_000,
+    genus: Annotated[int, typer.Option(help="Handles to be left.")] = 1,
+    max_cut: Annotated[
+        float,
+        typer.Option(help="Longest loop to cut along, as a share of the root of the area."),
+    ] = 0.25,
+    spacing: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y Z", help="Of voxels, if the file names none."),
+    ] = None,
+    json: Json = None,
+    quiet: Quiet = False,
+) -> None:
+    """Make a solid torus from a raw surface or a voxel mask.
+
+    Welds, orients, drops debris, closes holes, removes self-intersections, cuts surplus handles,
+    remeshes, fills with tets, and says what was done.
+    """
+    from .. import io
+    from ..base.progress import terminal
+    from ..errors import MeshError
+    from ..mesh.meshes import TetMesh
+    from ..preparation.pipeline import prepare as prepare_surface
+    from ..preparation.voxels import holds_mask, read_mask
+
+    common.check_outputs(output, io.suffixes(solid=True), json, raw)
+    common.require_package("gpytoolbox", "remeshing", "prepare")
+    given: Any
+    steps = spacing
+    if holds_mask(raw):
+        given, found = read_mask(raw)
+        steps = spacing or found
+    else:
+        mesh = common.read_mesh(raw)
+        if isinstance(mesh, TetMesh):
+            raise MeshError(f"{raw} is a solid already; prepare takes its surface")
+        given = mesh
+    with terminal(quiet) as bar:
+        done = prepare_surface(
+            given, faces=faces, genus=genus, max_cut=max_cut, progress=bar,
+            spacing=steps or (1.0, 1.0, 1.0),
+        )  # fmt: skip
+    common.write_together(output, done.save, json, done.to_dict())
+    if not quiet:
+        typer.echo(done.summary())
+        typer.echo(f"written to {output}")
 
 
 def tet(

@@ -7,6 +7,7 @@ Which is which is a matter of linking numbers, or of the solid when it is given,
 from __future__ import annotations
 
 import logging
+import math
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -186,8 +187,28 @@ class HomologyBasis(HasSummary):
             raise ArrayError(f"a class is {2 * self.genus} integers, not all zero")
         return self._shortest_loop(target, ())
 
+    def loop_below(self, coefficients: NDArray[np.int64], limit: float) -> NDArray[np.int32] | None:
+        """Shortest loop of a class if it is shorter than a limit; quick where the limit is small.
+
+        Parameters
+        ----------
+        coefficients : (2g,) array of int
+            As for `shortest_loop`.
+        limit : float
+            In units of ``V``.
+
+        Returns
+        -------
+        (k,) ndarray of int32, or None
+        """
+        loop = self._shortest_loop(np.asarray(coefficients), (), limit)
+        return loop if len(loop) else None
+
     def _shortest_loop(
-        self, target: NDArray[np.int64], known: tuple[NDArray[np.int32], ...]
+        self,
+        target: NDArray[np.int64],
+        known: tuple[NDArray[np.int32], ...],
+        limit: float = math.inf,
     ) -> NDArray[np.int32]:
         top = self.surface.topology
         lengths = _core.mesh.edge_lengths(top, self.surface.V)
@@ -197,7 +218,7 @@ class HomologyBasis(HasSummary):
             if self.classes(loop) @ self.intersection @ target
         ]
         loop = _core.homology.shortest_loop(
-            top, lengths, self.dual_forms, target.astype(np.int32), min(crossing, key=len)
+            top, lengths, self.dual_forms, target.astype(np.int32), min(crossing, key=len), limit
         )
         return read_only(np.array(loop, dtype=np.int32))
 

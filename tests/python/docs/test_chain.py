@@ -18,7 +18,7 @@ CHAIN = (
     ("mesh",),
     ("samples", "io", "forms", "measures"),
     ("homology", "maps"),
-    ("conformal", "certificate", "partitions"),
+    ("conformal", "certificate", "partitions", "preparation"),
     ("area",),
     ("volume",),
     ("registration",),

@@ -1,6 +1,8 @@
 // Shortest loop of edges in a homology class.
 #pragma once
 
+#include <limits>
+
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/homology/tree_cotree.hpp"
 
@@ -25,10 +27,12 @@ namespace stretchmap::homology {
 // \param edge_length (e) positive
 // \param forms       (k, e) integer closed 1-forms, a basis of H^1
 // \param target      (k) not zero
+// \param limit       only a shorter loop is looked for; where there is none, the answer is empty
 // \param crossing    a loop with non-zero intersection number with the class
 // \throws Error "SolverError" when no loop of the class passes through `crossing`.
 Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                    const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
-                   const Loop& crossing, const Poll& poll = {});
+                   const Loop& crossing, const Poll& poll = {},
+                   double limit = std::numeric_limits<double>::infinity());
 
 }  // namespace stretchmap::homology

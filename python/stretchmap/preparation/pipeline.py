@@ -1,0 +1,192 @@
+"""From a raw surface or a voxel mask to a solid torus filled with tets."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base import options
+from ..base.progress import Progress, report
+from ..errors import GenusError, SelfIntersectionError, SolverError
+from ..mesh.given import as_surface
+from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.tetrahedralize import tetrahedralize
+from .even import even
+from .handles import HandleCut, cut_handles
+from .holes import close_holes, crossings, remove_crossings
+from .report import Preparation, Step
+from .soup import Faces, Points, keep_largest, part_sheets, weld
+from .voxels import mask_surface
+
+__all__ = ["prepare"]
+
+_WELD = 1e-7  # share of the longest side of the bounding box
+_WORKING_FACES = 50_000  # handles are looked for on no more than about that many
+_WORKING_ITERATIONS = 3
+_TET = 2.0  # largest tet, in regular tets over the boundary's mean edge
+_REMESHINGS = 3
+
+
+def prepare(
+    surface: TriMesh | NDArray[Any],
+    *,
+    faces: int = 8_000,
+    genus: int = 1,
+    max_cut: float = 0.25,
+    spacing: Sequence[float] = (1.0, 1.0, 1.0),
+    progress: Progress | None = None,
+) -> Preparation:
+    """Make a solid that can be mapped from a raw surface or a voxel mask.
+
+    Vertices are welded, sheets that touch parted, faces oriented, debris dropped, holes closed,
+    self-intersections cut out and refilled, surplus handles cut along their shortest loops, the
+    surface remeshed to even triangles and filled with tets.
+
+    Parameters
+    ----------
+    surface : TriMesh, or (a, b, c) array of bool or integers
+        Any triangles, whatever their defects; or a mask, of which what is not zero belongs to the
+        solid.
+    faces : int
+        Number of boundary faces aimed at.
+    genus : int
+        Number of handles that are to be left; 1 for what `volume_map` takes.
+    max_cut : float
+        Longest loop a handle may be cut along, as a share of the square root of the area of the
+        surface. What is longer is taken for part of the shape.
+    spacing : three floats
+        Distance of voxels along each axis of a mask.
+    progress : Progress, optional
+        Called at the start of every step.
+
+    Returns
+    -------
+    Preparation
+
+    Raises
+    ------
+    OptionError
+        An option out of range.
+    KindError, ArrayError
+        Neither a surface nor a mask.
+    ConnectivityError
+        Two pieces too large to be debris.
+    GenusError
+        Fewer handles than wanted, or one too many that is longer than ``max_cut`` allows.
+    SelfIntersectionError
+        The surface crosses itself where cutting out and refilling does not help.
+    SolverError
+        Remeshing or filling failed.
+    MissingDependencyError
+        ``gpytoolbox`` or ``tetgen`` is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> raw = sm.samples.double_torus(6)
+    >>> done = sm.prepare(raw, faces=1_000, max_cut=0.7)
+    >>> done.solid.surface.genus, len(done.cuts)
+    (1, 1)
+    """
+    faces = options.whole("faces", faces, 100)
+    genus = options.whole("genus", genus, 0)
+    max_cut = options.real("max_cut", max_cut, 0.0)
+    run = _Run(progress)
+    if isinstance(surface, np.ndarray):
+        V, F = run.arrays("mask", mask_surface, surface, spacing)
+    else:
+        V, F = as_surface(surface).V, as_surface(surface).F
+    V, F = run.arrays("weld", weld, V, F, _WELD * float(np.ptp(V, axis=0).max()))
+    V, F = run.arrays("orient", part_sheets, V, F)
+    V, F = run.arrays("debris", keep_largest, V, F)
+    V, F = run.arrays("holes", close_holes, V, F)
+    closed = TriMesh(V, F)
+    if closed.n_faces > 1.3 * max(_WORKING_FACES, 2 * faces):
+        closed = run.coarsen(closed, max(_WORKING_FACES, 2 * faces))
+    sound = run.uncross(closed)
+    whole, cuts = run.cut(sound, genus, max_cut)
+    boundary = run.remesh(whole, faces)
+    solid = run.fill(boundary)
+    if solid.surface.genus != genus:
+        raise GenusError(f"the solid has genus {solid.surface.genus}, {genus} was wanted")
+    solid.require_solid_torus() if genus == 1 else solid.diagnose().require()
+    return Preparation(solid=solid, genus=genus, cuts=cuts, steps=tuple(run.steps))
+
+
+class _Run:
+    """The steps, each timed, counted and announced."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.steps: list[Step] = []
+        self._progress = progress
+        self._start = time.perf_counter()
+
+    def announce(self, name: str) -> None:
+        report(self._progress, name, len(self.steps))
+        self._start = time.perf_counter()
+
+    def done(self, name: str, counts: Mapping[str, float]) -> None:
+        self.steps.append(Step(name, dict(counts), time.perf_counter() - self._start))
+
+    def arrays(self, name: str, step: Callable[..., Any], *arguments: Any) -> tuple[Points, Faces]:
+        self.announce(name)
+        V, F, counts = step(*arguments)
+        self.done(name, counts)
+        return V, F
+
+    def coarsen(self, surface: TriMesh, faces: int) -> TriMesh:
+        self.announce("coarsen")
+        coarse = even(surface, faces, _WORKING_ITERATIONS)
+        self.done("coarsen", {"faces_before": surface.n_faces, "faces": coarse.n_faces})
+        return coarse
+
+    def uncross(self, surface: TriMesh) -> TriMesh:
+        self.announce("crossings")
+        sound, counts = remove_crossings(surface)
+        self.done("crossings", counts)
+        return sound
+
+    def cut(
+        self, surface: TriMesh, genus: int, max_cut: float
+    ) -> tuple[TriMesh, tuple[HandleCut, ...]]:
+        self.announce("handles")
+        whole, cuts = cut_handles(surface, genus, max_cut, self._progress)
+        kinds = [cut.kind for cut in cuts]
+        self.done("handles", {f"{kind}s_cut": kinds.count(kind) for kind in ("handle", "tunnel")})
+        return whole, cuts
+
+    def remesh(self, surface: TriMesh, faces: int) -> TriMesh:
+        """Even triangles that do not cross; what does is cut out and the rest remeshed again."""
+        self.announce("remesh")
+        removed = 0
+        for _ in range(_REMESHINGS):
+            smooth = even(surface, faces)
+            if not len(crossings(smooth)):
+                self.done("remesh", {"faces": smooth.n_faces, "crossing_faces_removed": removed})
+                return smooth
+            mended, counts = remove_crossings(smooth)
+            removed += counts["removed"]
+            if mended.genus != surface.genus:
+                break
+            surface = mended
+        if mended.genus == surface.genus:
+            self.done("remesh", {"faces": mended.n_faces, "crossing_faces_removed": removed})
+            return mended
+        raise SelfIntersectionError(
+            f"with {faces} faces the surface crosses itself where it is thin; ask for more faces"
+        )
+
+    def fill(self, surface: TriMesh) -> TetMesh:
+        self.announce("fill")
+        edges = surface.V[surface.edges]
+        edge = float(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).mean())
+        try:
+            solid = tetrahedralize(surface, _TET * edge**3 / (6.0 * 2.0**0.5))
+        except SolverError as error:
+            raise SolverError(f"{error}; ask for more faces", error.ids) from error
+        self.done("fill", {"tets": solid.n_tets})
+        return solid

@@ -1,0 +1,298 @@
+"""Raw surfaces and voxel masks become solid tori, and what was done is said."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gpytoolbox", reason="remeshing needs gpytoolbox")
+pytest.importorskip("skimage", reason="masks need scikit-image")
+pytest.importorskip("tetgen", reason="filling needs tetgen")
+
+import ct_like
+import stretchmap as sm
+from stretchmap import samples
+from stretchmap.cli import main
+from stretchmap.errors import (
+    ArrayError,
+    ConnectivityError,
+    FileFormatError,
+    GenusError,
+    KindError,
+    OptionError,
+    SelfIntersectionError,
+)
+from stretchmap.preparation.handles import cut_handles
+from stretchmap.preparation.holes import close_holes, crossings, remove_crossings
+from stretchmap.preparation.soup import keep_largest, part_sheets, weld
+from stretchmap.preparation.voxels import mask_surface, read_mask
+
+RAW = ct_like.Damage(holes=4, islands=5, inside_out=True, exploded=True)
+
+
+def raw(seed: int, genus: int, damage: ct_like.Damage, shape: str = "tube"):
+    return ct_like.damaged(*ct_like.surface(ct_like.mask(seed, shape, genus, 48)), damage, seed)
+
+
+def steps(done: sm.Preparation) -> dict[str, dict[str, float]]:
+    return {step.name: dict(step.counts) for step in done.steps}
+
+
+@pytest.mark.parametrize(("shape", "seed"), [("tube", 11), ("vertebra", 12)])
+def test_a_raw_surface_becomes_a_solid_that_maps(shape, seed):
+    V, F = raw(seed, 3, RAW, shape)
+    done = sm.prepare(sm.TriMesh(V, F), faces=2_000)
+    done.solid.require_solid_torus()
+    assert len(done.cuts) >= 1
+    counts = steps(done)
+    assert counts["debris"]["dropped"] >= 5
+    assert counts["holes"]["holes"] >= 1
+    assert counts["weld"]["welded"] > 1000
+    assert 1_500 < done.surface.n_faces < 2_500
+    assert sm.volume_map(done.solid).certificate.certified
+
+
+def test_the_shape_is_kept():
+    torus = samples.torus_surface(80, 40)
+    done = sm.prepare(torus, faces=3_000)
+    assert done.cuts == ()
+    assert done.solid.volume == pytest.approx(torus.volume, rel=0.02)
+    assert not any(step.changed for step in done.steps[:-2] if step.name != "handles")
+
+
+def test_a_handle_is_cut_at_the_loop_reported():
+    """The double torus has two handles of one size: one goes, where the cut says it was."""
+    surface = samples.double_torus(6)
+    whole, cuts = cut_handles(surface, 1, 0.7)
+    assert (surface.genus, whole.genus, len(cuts)) == (2, 1, 1)
+    assert not len(crossings(whole))
+    away = np.linalg.norm(surface.V - cuts[0].center, axis=1).min()
+    assert away < cuts[0].length
+    gone = np.linalg.norm(whole.V - cuts[0].center, axis=1).min()
+    assert np.isfinite(gone) and cuts[0].share == pytest.approx(cuts[0].length / surface.area**0.5)
+
+
+def test_a_bridge_and_a_tunnel_are_told_apart():
+    """A bar bent round to the body is cut, a hole drilled through the body is filled."""
+    box = np.zeros((40, 30, 24), bool)
+    box[4:36, 4:20, 4:20] = True
+    box[14:26, 8:16, :] = False  # the hole that stays
+    drilled = box.copy()
+    drilled[7:9, 11:13, :] = False
+    bridged = box.copy()
+    for bar in (np.s_[5:7, 20:25, 10:13], np.s_[11:13, 20:25, 10:13], np.s_[5:13, 23:25, 10:13]):
+        bridged[bar] = True
+    for mask, kind in ((drilled, "tunnel"), (bridged, "handle")):
+        done = sm.prepare(mask, faces=2_000)
+        assert [cut.kind for cut in done.cuts] == [kind]
+
+
+def test_handles_longer_than_the_limit_are_part_of_the_shape():
+    with pytest.raises(GenusError, match="max_cut"):
+        cut_handles(samples.double_torus(6), 1, 0.05)
+    with pytest.raises(GenusError, match="a hole is missing"):
+        sm.prepare(samples.sphere(20), faces=500)
+
+
+def test_other_genera_can_be_asked_for():
+    done = sm.prepare(samples.double_torus(6), faces=3_000, genus=2)
+    assert (done.genus, done.surface.genus, done.cuts) == (2, 2, ())
+
+
+def test_two_large_pieces_are_refused():
+    torus = samples.torus_surface(20, 10)
+    V = np.vstack([torus.V, torus.V + 10.0])
+    F = np.vstack([torus.F, torus.F + torus.n_vertices])
+    with pytest.raises(ConnectivityError, match="two large pieces") as caught:
+        sm.prepare(sm.TriMesh(V, F), faces=500)
+    assert len(caught.value.ids) == torus.n_faces
+
+
+def test_a_large_cavity_is_no_second_piece():
+    torus = samples.torus_surface(40, 20)
+    axis = torus.V * [1, 1, 0]
+    axis *= 1.0 / np.linalg.norm(axis, axis=1, keepdims=True)
+    radius = np.hypot(torus.V[:, 0], torus.V[:, 1])
+    core = axis * (0.5 * (radius.max() + radius.min()))
+    inner = core + 0.8 * (torus.V - core)
+    V, F = np.vstack([torus.V, inner]), np.vstack([torus.F, torus.F[:, ::-1] + torus.n_vertices])
+    _, kept, counts = keep_largest(V, np.ascontiguousarray(F))
+    assert (len(kept), counts["dropped"]) == (torus.n_faces, 1)
+
+
+def test_weld_joins_what_is_close_and_drops_what_collapses():
+    torus = samples.torus_surface(20, 10)
+    V = torus.V[torus.F].reshape(-1, 3) + 1e-9 * np.random.default_rng(0).random((600 * 2, 3))
+    F = np.arange(len(V), dtype=np.int32).reshape(-1, 3)
+    V, F, counts = weld(V, np.vstack([F, F[:1], [[0, 0, 1]]]), 1e-6)
+    assert (len(V), len(F)) == (torus.n_vertices, torus.n_faces)
+    assert (counts["collapsed"], counts["copies"]) == (1, 1)
+
+
+def test_sheets_that_touch_are_parted():
+    """Two tori with one vertex, then with one edge, in common."""
+    torus = samples.torus_surface(20, 10)
+    for shared in (torus.F[0, :1], torus.F[0, :2]):
+        F = torus.F + torus.n_vertices
+        for i in shared:
+            F[F == i + torus.n_vertices] = i
+        F = np.vstack([torus.F, F]).astype(np.int32)
+        V = np.vstack([torus.V, torus.V + 5.0])
+        W, G, counts = part_sheets(V, F)
+        assert counts["parted"] == len(shared)
+        assert sm.TriMesh(W, G).n_components == 2
+        assert not [d for d in sm.TriMesh(W, G).diagnose().defects if "manifold" in d.name]
+
+
+def test_faces_turned_at_random_are_oriented():
+    torus = samples.torus_surface(20, 10)
+    turned = np.random.default_rng(1).random(torus.n_faces) < 0.4
+    F = np.where(turned[:, None], torus.F[:, ::-1], torus.F)
+    V, F, _ = part_sheets(torus.V, np.ascontiguousarray(F, np.int32))
+    sm.TriMesh(V, F).require_genus_one()
+
+
+@pytest.mark.parametrize("rings", [1, 3, 12])
+def test_holes_of_all_sizes_are_closed(rings):
+    """Of one face, of many, and a border longer than is filled in one piece."""
+    torus = samples.torus_surface(400, 40) if rings == 12 else samples.torus_surface(40, 20)
+    middle = torus.V[torus.F].mean(axis=1)
+    order = np.argsort(np.linalg.norm(middle - middle[0], axis=1))
+    gone = order[: 1 + 6 * rings**2] if rings < 12 else np.flatnonzero(middle[:, 2] > 0.8)
+    V, F, _ = part_sheets(torus.V, np.delete(torus.F, gone, axis=0))
+    V, F, counts = close_holes(V, F)
+    closed = sm.TriMesh(V, F)
+    assert closed.diagnose().border_edges.size == 0
+    assert closed.n_components == 1 and counts["faces"] >= counts["longest"] - 2
+    assert closed.volume > 0
+
+
+def test_crossings_are_cut_out():
+    """A dent pushed through to the other side of the tube."""
+    torus = samples.torus_surface(60, 30)
+    V = torus.V.copy()
+    top = np.argmax(V[:, 0] + V[:, 2])
+    near = np.linalg.norm(V - V[top], axis=1) < 0.3 * np.ptp(V[:, 2])
+    V[near, 2] -= 1.3 * np.ptp(V[:, 2])
+    bent = sm.TriMesh(V, torus.F)
+    assert len(crossings(bent))
+    sound, counts = remove_crossings(bent)
+    assert not len(crossings(sound)) and counts["crossing"] > 0
+    sound.require_closed()
+
+
+def test_crossings_that_cannot_be_cut_out_are_refused():
+    torus = samples.torus_surface(12, 8)
+    V = np.random.default_rng(0).random(torus.V.shape)
+    with pytest.raises(SelfIntersectionError, match="crosses itself") as caught:
+        remove_crossings(sm.TriMesh(V, torus.F))
+    assert caught.value.ids
+
+
+def test_a_mask_is_cleaned_and_placed():
+    mask = np.zeros((30, 30, 12), bool)
+    mask[5:25, 5:25, 3:9] = True
+    mask[11:19, 11:19, :] = False
+    mask[6:9, 6:9, 5:7] = False  # a cavity
+    mask[0, 0, 0] = True  # an island
+    V, F, counts = mask_surface(mask, (0.5, 1.0, 2.0))
+    assert counts["island_voxels_dropped"] == 1 and counts["cavity_voxels_filled"] == 18
+    surface = sm.TriMesh(V, F, orient=True)
+    surface.require_genus_one()
+    np.testing.assert_allclose(V.min(axis=0), [2.25, 4.5, 5.0], atol=0.1)
+    np.testing.assert_allclose(V.max(axis=0), [12.25, 24.5, 17.0], atol=0.1)
+    assert surface.volume == pytest.approx(2 * (20 * 20 - 64) * 6 * 0.5, rel=0.06)  # rounded edges
+
+
+@pytest.mark.parametrize(
+    ("mask", "error"),
+    [
+        (np.zeros((4, 4, 4), bool), ArrayError),
+        (np.zeros((4, 4), bool), ArrayError),
+        (np.ones((4, 4, 4)), ArrayError),
+    ],
+)
+def test_what_is_no_mask_is_refused(mask, error):
+    with pytest.raises(error, match="mask"):
+        sm.prepare(mask)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{"faces": 10}, {"faces": 1e4}, {"genus": -1}, {"max_cut": float("nan")}],
+)
+def test_options_out_of_range(bad):
+    with pytest.raises(OptionError, match=next(iter(bad))):
+        sm.prepare(samples.torus_surface(20, 10), **bad)
+    with pytest.raises(OptionError, match="spacing"):
+        sm.prepare(np.ones((4, 4, 4), bool), spacing=(1.0, 0.0, 1.0))
+    with pytest.raises(KindError):
+        sm.prepare("raw.stl")
+
+
+def test_progress_names_every_step():
+    seen = []
+    sm.prepare(
+        samples.double_torus(6),
+        faces=800,
+        max_cut=0.7,
+        progress=lambda stage, done, total, **values: seen.append(stage),
+    )
+    assert list(dict.fromkeys(seen)) == [
+        "weld", "orient", "debris", "holes", "crossings", "handles", "remesh", "fill",
+    ]  # fmt: skip
+
+
+def test_a_large_surface_is_coarsened_before_loops_are_looked_for():
+    torus = samples.torus_surface(300, 150)
+    done = sm.prepare(torus, faces=1_000)
+    assert steps(done)["coarsen"]["faces_before"] == 90_000
+    done.solid.require_solid_torus()
+
+
+def test_the_command(tmp_path, capsys):
+    V, F = raw(21, 2, RAW)
+    sm.write(tmp_path / "raw.stl", sm.TriMesh(V, F))
+    report = tmp_path / "report.json"
+    arguments = ["prepare", str(tmp_path / "raw.stl"), "-o", str(tmp_path / "solid.npz")]
+    assert main([*arguments, "--faces", "1500", "--json", str(report)]) == 0
+    assert "boundary faces, genus 1" in capsys.readouterr().out
+    sm.read(tmp_path / "solid.npz").require_solid_torus()
+    told = json.loads(report.read_text())
+    assert {step["name"] for step in told["steps"]} >= {"weld", "handles", "fill"}
+    assert all(cut["length"] > 0 and len(cut["center"]) == 3 for cut in told["cuts"])
+    assert main([*arguments, "--genus", "7"]) == 2
+
+
+def test_the_command_takes_masks(tmp_path):
+    mask = ct_like.mask(3, "tube", 1, 40)
+    np.save(tmp_path / "mask.npy", mask)
+    np.savez(tmp_path / "mask.npz", mask=mask, spacing=[0.5, 0.5, 1.0])
+    for name, size in (("mask.npy", 1.0), ("mask.npz", 0.5)):
+        out = tmp_path / "solid.npz"
+        assert main(["prepare", str(tmp_path / name), "-o", str(out), "--faces", "800", "-q"]) == 0
+        solid = sm.read(out)
+        solid.require_solid_torus()
+        assert np.ptp(solid.V[:, 0]) == pytest.approx(
+            size * np.ptp(np.argwhere(mask)[:, 0]), rel=0.1
+        )
+
+
+def test_nifti_is_read_with_its_spacing(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    mask = ct_like.mask(3, "tube", 1, 24).astype(np.uint8)
+    image = nibabel.Nifti1Image(mask, np.diag([0.5, 0.7, 2.0, 1.0]))
+    nibabel.save(image, tmp_path / "mask.nii.gz")
+    found, spacing = read_mask(tmp_path / "mask.nii.gz")
+    np.testing.assert_array_equal(found, mask)
+    np.testing.assert_allclose(spacing, [0.5, 0.7, 2.0], rtol=1e-6)
+
+
+def test_damaged_masks(tmp_path):
+    (tmp_path / "a.npy").write_bytes(b"no array")
+    np.savez(tmp_path / "b.npz", x=np.zeros(3))
+    for name in ("a.npy", "b.npz"):
+        with pytest.raises(FileFormatError, match=name):
+            read_mask(tmp_path / name)
