@@ -10,10 +10,11 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.options import installed_memory
 from ..errors import ArrayError, FileFormatError
 from .arrays import MeshArrays
 
-__all__ = ["read_npz", "save_npz", "write_npz"]
+__all__ = ["read_archive", "read_npz", "save_npz", "write_npz"]
 
 _MESH_KEYS = ("V", "F", "T")
 _SLICE = 1 << 20  # bytes
@@ -53,13 +54,31 @@ def save_npz(file: BinaryIO, arrays: Mapping[str, NDArray[Any]]) -> None:
                 np.lib.format.write_array(_Slices(member), np.asanyarray(array), allow_pickle=False)
 
 
+def read_archive(file: BinaryIO) -> dict[str, NDArray[Any]]:
+    """All arrays of an archive by name.
+
+    Raises
+    ------
+    FileFormatError
+        It is none, or holds more than there is memory for.
+    Exception
+        What NumPy and zipfile raise where it is damaged; see `base.files.parsing`.
+    """
+    if not zipfile.is_zipfile(file):
+        raise FileFormatError("it is no .npz archive; V and F or T are needed")
+    file.seek(0)
+    with zipfile.ZipFile(file) as archive:
+        size = sum(member.file_size for member in archive.infolist())
+    if size > installed_memory():
+        raise FileFormatError(f"its arrays take {size / 2**30:.3g} GiB, more than there is memory")
+    file.seek(0)
+    with np.load(file, allow_pickle=False) as loaded:
+        return {name: np.asarray(loaded[name]) for name in loaded.files}
+
+
 def read_npz(file: BinaryIO) -> MeshArrays:
     """The mesh ``V`` with ``F`` or ``T`` and all other arrays of an archive."""
-    loaded = np.load(file, allow_pickle=False)
-    if not isinstance(loaded, np.lib.npyio.NpzFile):
-        raise FileFormatError("it holds a single array; V and F or T are needed")
-    with loaded as archive:
-        arrays = {name: archive[name] for name in archive.files}
+    arrays = read_archive(file)
     if "V" not in arrays or not {"F", "T"} & arrays.keys():
         raise FileFormatError(
             f"V and F or T are needed, it holds {', '.join(sorted(arrays)) or 'nothing'}"

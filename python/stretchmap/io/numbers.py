@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import os
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.files import open_to_read
+from ..base.options import as_path
 from ..errors import FileFormatError
 
 
@@ -35,8 +38,10 @@ def read_numbers(path: str | os.PathLike[str], widths: dict[int, str]) -> NDArra
     OSError
         If it cannot be opened.
     """
+    path = as_path(path)
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
+        with open_to_read(path) as binary:
+            file = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
             reader = csv.reader(file)
             lines = [
                 (reader.line_num, [cell.strip() for cell in row])

@@ -21,16 +21,15 @@ from __future__ import annotations
 import errno
 import logging
 import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
 from numpy.typing import ArrayLike
 
-from ..base.files import atomic_path
+from ..base.files import atomic_path, open_to_read, parsing
 from ..base.options import as_path, flag
-from ..errors import FileFormatError, StretchmapError
+from ..errors import FileFormatError
 from ..mesh.given import as_mesh, as_solid, as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from .arrays import MeshArrays, checked, checked_uv
@@ -155,16 +154,16 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
     """
     path = as_path(path)
     suffix = _known_suffix(path, {".npz", *_READERS, *_MESHIO})
-    with open(path, "rb") as file:
+    with open_to_read(path) as file:
         if not file.read(1):
             raise FileFormatError(f"{path} is empty")
         file.seek(0)
-        with _parsing(path):
+        with parsing(path):
             if suffix in _READERS:
                 return _READERS[suffix](file.read())
             if suffix == ".npz":
                 return read_npz(file)
-    with _parsing(path):
+    with parsing(path):
         return read_meshio(path, _MESHIO[suffix])
 
 
@@ -244,17 +243,3 @@ def _known_suffix(path: Path, known: set[str]) -> str:
             f"{', '.join(suffixes(solid=False))}"
         )
     return suffix
-
-
-@contextmanager
-def _parsing(path: Path) -> Iterator[None]:
-    """Turn whatever a parser raises into one error that names the file."""
-    try:
-        yield
-    except FileFormatError as error:
-        raise FileFormatError(f"{path} cannot be read: {error}") from error
-    except StretchmapError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise FileFormatError(f"{path} is damaged or not what its name says: {reason}") from error

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import os
-import zipfile
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import as_points
+from ..base.arrays import as_points, as_reals
+from ..base.files import open_to_read, parsing
+from ..base.options import as_path
 from ..base.torus import Torus
-from ..errors import FileFormatError
+from ..errors import FileFormatError, MeshError, OptionError
+from ..io.npz import read_archive
 from ..mesh.meshes import TetMesh, TriMesh
-from .history import NAN, IterationRecord
+from .meta import read_history, read_meta
 from .result import MapResult
 
 __all__ = ["LoadedMap", "load_map"]
@@ -78,38 +77,37 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     OSError
         If it cannot be opened.
     """
-    with open(path, "rb") as stream:
-        if not zipfile.is_zipfile(stream):
-            raise FileFormatError(f"{path} is not a readable .npz file")
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise FileFormatError(f"{path} is not a readable .npz file: {error}") from None
-    if "V" in arrays and "image" not in arrays and ("F" in arrays or "T" in arrays):
-        raise FileFormatError(f"{path} holds a mesh and no image of it: it has to be mapped first")
-    missing = [key for key in ("V", "image") if key not in arrays]
-    if missing or ("F" in arrays) == ("T" in arrays):
-        raise FileFormatError(f"{path} must hold V, image and either F or T; it has {list(arrays)}")
-    meta = _read_meta(path, arrays.pop("meta", None))
-    V, image = arrays.pop("V"), as_points(arrays.pop("image"), "image")
-    if image.shape != V.shape:
-        raise FileFormatError(f"{path}: image has shape {image.shape}, V {V.shape}")
-    mesh = TetMesh(V, arrays.pop("T")) if "T" in arrays else TriMesh(V, arrays.pop("F"))
-    radii = arrays.pop("torus", None)
-    if radii is not None and radii.shape != (2,):
-        raise FileFormatError(f"{path}: torus must hold R and r, it has shape {radii.shape}")
+    path = as_path(path)
+    with open_to_read(path) as file, parsing(path):
+        arrays = read_archive(file)
+        if "V" in arrays and "image" not in arrays and ("F" in arrays or "T" in arrays):
+            raise FileFormatError("it holds a mesh and no image of it: it has to be mapped first")
+        if not {"V", "image"} <= arrays.keys() or ("F" in arrays) == ("T" in arrays):
+            raise FileFormatError(
+                f"V, image and either F or T are needed, it has {', '.join(arrays) or 'nothing'}"
+            )
+        meta = read_meta(arrays.pop("meta", None))
+        history = read_history(meta)
+        V, image = arrays.pop("V"), as_points(arrays.pop("image"), "image")
+        if image.shape != V.shape:
+            raise FileFormatError(f"image has shape {image.shape}, V {V.shape}")
+        mesh = TetMesh(V, arrays.pop("T")) if "T" in arrays else TriMesh(V, arrays.pop("F"))
+        torus = _torus(arrays.pop("torus", None))
+        angles = arrays.get("angles")
+        if angles is not None:
+            angles = arrays["angles"] = as_reals(angles, "angles", (len(V), 2))
+        target = _target(arrays)
     return LoadedMap(
         mesh=mesh,
         image=image,
-        torus=None if radii is None else Torus(*radii),
-        target=_target(arrays),
-        angles=arrays.get("angles"),
+        torus=torus,
+        target=target,
+        angles=angles,
         arrays=arrays,
         meta=meta,
-        history=_read_history(path, meta.get("history", [])),
-        converged=bool(meta.get("converged", False)),
-        stop_reason=str(meta.get("stop_reason", "read from a file")),
+        history=history,
+        converged=meta.get("converged", False),
+        stop_reason=meta.get("stop_reason", "read from a file"),
         seconds=meta.get("seconds", {}),
     )
 
@@ -120,31 +118,10 @@ def _target(arrays: dict[str, NDArray[Any]]) -> TetMesh | None:
     return TetMesh(arrays["target_V"], arrays["target_T"])
 
 
-def _read_meta(path: object, meta: NDArray[Any] | None) -> dict[str, Any]:
-    if meta is None:
-        return {}
+def _torus(radii: NDArray[Any] | None) -> Torus | None:
+    if radii is None:
+        return None
     try:
-        value = json.loads(str(meta))
-    except ValueError as error:
-        raise FileFormatError(f"{path}: meta is not JSON: {error}") from None
-    if not isinstance(value, dict):
-        raise FileFormatError(f"{path}: meta is not a JSON object")
-    return value
-
-
-# Fields of records that files of version 0.1 call otherwise.
-_NAMES_OF_0_1 = {"ring_sd": "ring_std", "element_sd": "element_std"}
-
-
-def _read_history(path: object, records: Any) -> tuple[IterationRecord, ...]:
-    names = [f.name for f in dataclasses.fields(IterationRecord)]
-
-    def restored(record: dict[str, Any]) -> IterationRecord:
-        values = {_NAMES_OF_0_1.get(name, name): value for name, value in record.items()}
-        values = {name: NAN if values[name] is None else values[name] for name in names}
-        return IterationRecord(**values)
-
-    try:
-        return tuple(restored(record) for record in records)
-    except (TypeError, KeyError, AttributeError) as error:
-        raise FileFormatError(f"{path}: the history in meta cannot be read: {error!r}") from None
+        return Torus(*as_reals(radii, "torus", (2,)))
+    except (MeshError, OptionError) as error:
+        raise FileFormatError(str(error)) from None

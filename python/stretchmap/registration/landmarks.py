@@ -157,6 +157,7 @@ def read_landmarks(
         If the file cannot be opened.
     """
     source, target = as_solid(source, "source"), as_solid(target, "target")
+    within = real("within", within, above=0.0)
     widths = {2: "vertex ids", 6: "coordinates in source and target"}
     values = read_numbers(path, widths)
     if values.shape[1] == 2:
