@@ -12,6 +12,16 @@ class StretchmapError(Exception):
     ----------
     ids : tuple of int
         Offending vertices, faces, tets or edges (which of them, the message says); may be empty.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> surface = sm.samples.torus_surface(12, 6)
+    >>> try:
+    ...     sm.TriMesh(surface.V, surface.F[2:]).require_closed()
+    ... except sm.errors.StretchmapError as error:
+    ...     print(type(error).__name__, error.ids)
+    OpenSurfaceError (0, 1, 0, 6, 1, 7, 6, 7)
     """
 
     def __init__(self, message: str, ids: Iterable[int] = ()) -> None:

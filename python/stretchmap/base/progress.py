@@ -17,7 +17,18 @@ __all__ = ["Progress", "report", "terminal", "throttled"]
 
 
 class Progress(Protocol):
-    """Anything that can be called with the state of a computation."""
+    """Anything that can be called with the state of a computation.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> stages = set()
+    >>> def note(stage, done, total, **values):
+    ...     stages.add(stage)
+    >>> result = sm.area_map(sm.samples.torus_surface(24, 12), progress=note)
+    >>> "area" in stages
+    True
+    """
 
     def __call__(self, stage: str, done: int, total: int, **values: float) -> None:
         """Take note of a step.

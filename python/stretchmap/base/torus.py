@@ -32,6 +32,16 @@ class Torus:
     ------
     OptionError
         If the radii are not finite or do not satisfy ``0 < r < R``.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> torus = sm.Torus(3.0, 1.0)
+    >>> torus.xi(0.0, 0.0).tolist(), torus.xi(0.0, 0.0, s=0.0).tolist()
+    ([4.0, 0.0, 0.0], [3.0, 0.0, 0.0])
+    >>> u, v, s = torus.coordinates([[0.0, 3.0, 0.5]])
+    >>> round(float(u[0]), 6), round(float(v[0]), 6), float(s[0])
+    (1.570796, 1.570796, 0.5)
     """
 
     R: float
@@ -61,6 +71,12 @@ class Torus:
         ------
         OptionError
             If the ratio is not above 1, or volume or area is not positive, or both are given.
+
+        Examples
+        --------
+        >>> import stretchmap as sm
+        >>> round(sm.Torus.from_ratio(3.0, volume=1.0).volume, 12)
+        1.0
         """
         if volume is not None and area is not None:
             raise OptionError("give the volume or the area of the torus, not both")

@@ -88,6 +88,22 @@ def certify(
         If it holds a NaN or an infinity.
     OptionError
         If the tolerance is negative or not finite.
+
+    Notes
+    -----
+    The theorem and its proof are in the documentation of `stretchmap.certificate.checks`; for the
+    degree of piecewise-affine maps see Lipman (2014), for exact signs Shewchuk (1997).
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> sm.certify(solid, solid.V).certified
+    True
+    >>> squashed = solid.V.copy()
+    >>> squashed[0] = solid.V[1]
+    >>> sm.certify(solid, squashed).certified
+    False
     """
     mesh = as_mesh(mesh)
     tolerance = real("tolerance", tolerance, 0.0)
@@ -126,6 +142,10 @@ def certify_file(
     tolerance : float
         As in :func:`certify`.
 
+    Returns
+    -------
+    Certificate
+
     Raises
     ------
     FileFormatError
@@ -134,6 +154,17 @@ def certify_file(
         If its arrays are not a mesh.
     OSError
         If it cannot be opened.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> result = sm.volume_map(sm.samples.solid_torus(600))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     result.save(os.path.join(folder, "map.npz"))
+    ...     found = sm.certify_file(os.path.join(folder, "map.npz"))
+    >>> found.certified
+    True
     """
     if torus is not None:
         instance("torus", torus, Torus, "Torus(R, r)")

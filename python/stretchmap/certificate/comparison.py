@@ -43,6 +43,14 @@ class Comparison(HasSummary):
     distortion : dict of Distortion
         By the names of the maps.
     certificate : dict of Certificate
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> found = sm.compare(solid, {"as it is": solid.V, "mirrored": -solid.V})
+    >>> [found.certificate[name].certified for name in found.distortion]
+    [True, False]
     """
 
     mesh: TriMesh | TetMesh = field(repr=False)

@@ -41,6 +41,14 @@ class Certificate(HasSummary):
     ids : dict of str to tuple of int
         Elements at fault, by check: tets for the volumes, boundary faces for the boundary (flat
         list of pairs for crossings), at most 1000 of each.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> found = sm.certify(solid, solid.V)
+    >>> found.certified, found.checks["image_positive"], found.ids
+    (True, True, {})
     """
 
     certified: bool

@@ -39,6 +39,15 @@ def hodge_lattice(surface: TriMesh, basis: HomologyBasis | None = None) -> NDArr
     ------
     MeshError, GenusError, SolverError
         As `conformal_map`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> from stretchmap.conformal.hodge import hodge_lattice
+    >>> surface = sm.samples.torus_surface(60, 30)
+    >>> bool(np.allclose(hodge_lattice(surface), sm.conformal_map(surface).lattice, rtol=0.01))
+    True
     """
     if basis is None:
         basis = homology_basis(surface)

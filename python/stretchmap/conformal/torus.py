@@ -22,6 +22,13 @@ def conformal_torus(aspect: float) -> Torus:
     The printed ``r = sqrt(aspect^2 - 1)`` is not conformal; with ``r = aspect`` the two derivatives
     are ``r / D`` and ``1 / D``, ``D = sqrt(r^2 + 1) - cos v``, and every aspect embeds: centre
     radius ``sqrt(1 + r^2) / r``, tube radius ``1 / r``.
+
+    Examples
+    --------
+    >>> from stretchmap.conformal.torus import conformal_torus
+    >>> torus = conformal_torus(1.0)
+    >>> round(torus.ratio**2, 12)
+    2.0
     """
     return Torus(math.sqrt(1.0 + aspect * aspect) / aspect, 1.0 / aspect)
 
@@ -31,6 +38,13 @@ def tube_angle(turns: NDArray[np.float64], aspect: float) -> NDArray[np.float64]
 
     ``tan(v / 2) = tan(y / 2) (sqrt(1 + aspect^2) + 1) / aspect``, on the branch that is continuous
     in y, so that v minus y is periodic.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stretchmap.conformal.torus import tube_angle
+    >>> (tube_angle(np.array([0.0, 0.25, 0.5, 1.0]), aspect=1.0) / np.pi).round(3).tolist()
+    [0.0, 0.75, 1.0, 2.0]
     """
     whole = np.round(turns)
     y = 2.0 * np.pi * (turns - whole)

@@ -30,6 +30,14 @@ class HolomorphicForms:
         Integrals of ``omega_l ^ *omega_m``, b of (3.10).
     wedge : ndarray, shape (2g, 2g)
         Integrals of ``omega_l ^ omega_m``, c of (3.10); integers to rounding.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> found = sm.holomorphic_forms(sm.samples.torus_surface(24, 12))
+    >>> square = found.coefficients @ found.coefficients
+    >>> square.round(1).tolist()  # minus the identity, but for the size of the faces
+    [[-1.0, 0.0], [0.0, -1.0]]
     """
 
     real: NDArray[np.float64] = field(repr=False)

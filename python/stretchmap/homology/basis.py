@@ -74,6 +74,15 @@ class HomologyBasis(HasSummary):
     torus_forms : ndarray, shape (2, e), int32
         Genus one only: row 0 has period 1 on the longitude and 0 on the meridian, row 1 the other
         way round; the integral of row 0 wedge row 1 over the outward surface is +1.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> basis = sm.homology_basis(sm.samples.torus_surface(24, 12))
+    >>> basis.genus, len(basis.meridian), len(basis.longitude)
+    (1, 12, 24)
+    >>> basis.intersection.tolist() in ([[0, 1], [-1, 0]], [[0, -1], [1, 0]])
+    True
     """
 
     surface: TriMesh = field(repr=False)
@@ -348,6 +357,14 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
     -----
     Signs: the pair longitude, meridian may be turned round as a whole; only its orientation with
     respect to the outward normal is fixed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_double_torus(1)
+    >>> basis = sm.homology_basis(solid.surface, solid)
+    >>> basis.genus, [len(loop) for loop in basis.handle_loops]
+    (2, [4, 4])
     """
     surface = as_surface(surface)
     if solid is not None:

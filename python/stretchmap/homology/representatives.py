@@ -46,6 +46,16 @@ def harmonic_forms(
         Unknown weights.
     SolverError
         The Laplacian could not be factorised.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> surface = sm.samples.torus_surface(24, 12)
+    >>> sm.harmonic_forms(surface).forms.shape
+    (2, 864)
+    >>> found = sm.harmonic_forms(surface, weights="intrinsic_delaunay")
+    >>> found.weights, found.gram.shape
+    ('intrinsic_delaunay', (2, 2))
     """
     if basis is None:
         from ..homology.basis import homology_basis
@@ -75,6 +85,13 @@ def holomorphic_forms(surface: TriMesh, basis: HomologyBasis | None = None) -> H
     ------
     MeshError, SolverError
         As `homology_basis`.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> found = sm.holomorphic_forms(sm.samples.double_torus(2))
+    >>> found.wedge.round().astype(int).shape
+    (4, 4)
     """
     real = harmonic_forms(surface, basis).forms
     star, wedge = _core.forms.hodge_products(surface.topology, surface.V, real)

@@ -33,6 +33,13 @@ class MeshArrays:
         Further arrays of an ``.npz`` file, by name.
     corner_uv : (m, 3, 2) ndarray or None
         Texture coordinates of the triangle corners of an ``.obj`` file.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stretchmap.io import MeshArrays
+    >>> MeshArrays(np.zeros((3, 3)), F=np.array([[0, 1, 2]])).elements.tolist()
+    [[0, 1, 2]]
     """
 
     V: NDArray[Any]

@@ -62,7 +62,22 @@ _WITHOUT_DATA = {".obj", ".off", ".stl", ".mesh"}
 
 
 def suffixes(solid: bool) -> tuple[str, ...]:
-    """Return the suffixes of the formats that can hold a solid, or a surface."""
+    """Return the suffixes of the formats that can hold a solid, or a surface.
+
+    Parameters
+    ----------
+    solid : bool
+
+    Returns
+    -------
+    tuple of str
+
+    Examples
+    --------
+    >>> from stretchmap import io
+    >>> ".stl" in io.suffixes(solid=False), ".stl" in io.suffixes(solid=True)
+    (True, False)
+    """
     return (".npz", *_MESHIO) if solid else (".npz", *_WRITERS, *_MESHIO)
 
 
@@ -97,6 +112,17 @@ def read(
         The arrays in the file are not a mesh (index out of range, NaN, ...).
     OSError
         The file cannot be opened.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "torus.ply")
+    ...     sm.write(path, sm.samples.torus_surface(12, 6))
+    ...     mesh = sm.read(path)
+    >>> mesh
+    TriMesh(72 vertices, 144 faces)
     """
     orient, compact = flag("orient", orient), flag("compact", compact)
     arrays = read_arrays(path)
@@ -116,6 +142,17 @@ def read_surface(
         The file holds a solid.
     FileFormatError, MissingDependencyError, MeshError, OSError
         As `read`.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "torus.off")
+    ...     sm.write(path, sm.samples.torus_surface(12, 6))
+    ...     surface = sm.read_surface(path)
+    >>> surface.genus
+    1
     """
     return as_surface(read(path, orient=orient, compact=compact), str(path))
 
@@ -131,6 +168,17 @@ def read_solid(
         The file holds a surface.
     FileFormatError, MissingDependencyError, MeshError, OSError
         As `read`.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "solid.npz")
+    ...     sm.write(path, sm.samples.solid_torus(600))
+    ...     solid = sm.read_solid(path)
+    >>> solid.n_tets
+    594
     """
     return as_solid(read(path, orient=orient, compact=compact), str(path))
 
@@ -151,6 +199,18 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
     ------
     FileFormatError, MissingDependencyError, OSError
         As for `read`.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "solid.npz")
+    ...     sm.write(path, solid, cell_data={"density": solid.tet_volumes})
+    ...     arrays = sm.io.read_arrays(path)
+    >>> arrays.cell_data["density"].shape
+    (594,)
     """
     path = as_path(path)
     suffix = _known_suffix(path, {".npz", *_READERS, *_MESHIO})
@@ -197,6 +257,16 @@ def write(
         The format needs meshio and it is not installed.
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sm.write(os.path.join(folder, "solid.npz"), solid, point_data={"x": solid.V[:, 0]})
+    ...     os.listdir(folder)
+    ['solid.npz']
     """
     path, mesh = as_path(path), as_mesh(mesh)
     suffix = _known_suffix(path, {".npz", *_WRITERS, *_MESHIO})

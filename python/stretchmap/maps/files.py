@@ -39,6 +39,17 @@ class LoadedMap(MapResult):
         The scalars stored with it; empty for a file of another program.
     image, angles, history, converged, stop_reason, seconds
         As in the result that was saved.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> result = sm.area_map(sm.samples.torus_surface(24, 12))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     result.save(os.path.join(folder, "map.npz"))
+    ...     loaded = sm.load_map(os.path.join(folder, "map.npz"))
+    >>> loaded.title, loaded.torus == result.torus, sorted(loaded.arrays)
+    ('area', True, ['angles', 'forms', 'ratios', 'ring_ratios'])
     """
 
     arrays: dict[str, NDArray[Any]] = field(repr=False)
@@ -68,6 +79,10 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     path : path-like
         An ``.npz`` with ``V (n, 3)``, ``F`` or ``T``, and ``image (n, 3)``.
 
+    Returns
+    -------
+    LoadedMap
+
     Raises
     ------
     FileFormatError
@@ -76,6 +91,21 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
         If the mesh in it is invalid, or the image not finite.
     OSError
         If it cannot be opened.
+
+    Examples
+    --------
+    A file of another program:
+
+    >>> import os, tempfile
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "map.npz")
+    ...     np.savez(path, V=solid.V, T=solid.T, image=2.0 * solid.V)
+    ...     loaded = sm.load_map(path)
+    >>> loaded.distortion.flips, loaded.torus is None
+    (0, True)
     """
     path = as_path(path)
     with open_to_read(path) as file, parsing(path):

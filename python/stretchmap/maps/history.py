@@ -36,6 +36,14 @@ class IterationRecord:
         Standard deviation of the per-vertex ratios (6.3)/(6.5) and of the per-element ratios.
     seconds : float
         Since the start of the stage.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> result = sm.area_map(sm.samples.torus_surface(24, 12))
+    >>> first = result.history[0]
+    >>> first.stage, first.iteration, first.flips
+    ('sem', 0, 0)
     """
 
     stage: str

@@ -34,6 +34,14 @@ class Located:
         The tet each point was found in, -1 outside.
     weights : ndarray, shape (n, 4)
         Barycentric coordinates there, summing to one; NaN outside.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> found = sm.volume_map(solid).point_map.forward([[3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    >>> found.inside.tolist(), found.points.shape
+    ([True, False], (2, 3))
     """
 
     points: NDArray[np.float64]
@@ -107,6 +115,17 @@ class PointMap:
     -----
     The image of a curved boundary is a polyhedron: a point of the torus between its vertices lies
     outside it by the height of the chord, far more than the tolerance.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> points = sm.PointMap(sm.volume_map(solid))
+    >>> centers = solid.V[solid.T].mean(axis=1)
+    >>> there = points.forward(centers).points
+    >>> bool(np.allclose(points.inverse(there).points, centers))
+    True
     """
 
     def __init__(self, result: ImageOfMesh, tolerance: float = 1e-9) -> None:

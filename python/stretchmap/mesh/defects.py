@@ -31,6 +31,14 @@ class Defect:
         Elements or vertices at fault; edges and faces given by vertices are flattened.
     error : type
         The exception `require_...` raises for it.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> surface = sm.samples.torus_surface(12, 6)
+    >>> for defect in sm.TriMesh(surface.V, surface.F[:, ::-1]).diagnose().defects:
+    ...     print(defect.name, defect.error.__name__)
+    inside_out OrientationError
     """
 
     name: str

@@ -71,6 +71,17 @@ class Diagnosis(HasSummary):
         where it has a border, is not manifold or not orientable.
     cavity_vertices : (a,) ndarray of int32
         Vertices on all components of a solid's boundary but the one with the most faces.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> surface = sm.samples.torus_surface(12, 6)
+    >>> holed = sm.TriMesh(surface.V, surface.F[1:])
+    >>> found = holed.diagnose()
+    >>> found.ok, len(found.border_edges)
+    (False, 3)
+    >>> print(found.summary().splitlines()[-1])
+    - 3 edges ((0, 6), (0, 7), (6, 7)) on a border; close the holes
     """
 
     kind: str

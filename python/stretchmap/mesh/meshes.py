@@ -85,6 +85,20 @@ class TriMesh(_Mesh):
     -----
     Construction checks the arrays, not the topology: a mesh with defects can be held, diagnosed
     (`diagnose`) and repaired. What needs more says so (`require_closed`, `require_genus_one`).
+
+    Examples
+    --------
+    A cube's corner cut off, with one face turned over:
+
+    >>> import stretchmap as sm
+    >>> V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> F = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 3, 2]]
+    >>> mesh = sm.TriMesh(V, F)
+    >>> mesh.diagnose().misoriented.tolist()
+    [3]
+    >>> mesh = sm.TriMesh(V, F, orient=True)
+    >>> mesh.n_turned, mesh.genus, round(6 * mesh.volume)
+    (1, 0, 1)
     """
 
     F: NDArray[np.int32]
@@ -260,6 +274,16 @@ class TetMesh(_Mesh):
     -----
     Construction checks the arrays, not the topology: a mesh with defects can be held, diagnosed
     (`diagnose`) and repaired. What needs more says so (`require_solid_torus`).
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> mesh = sm.TetMesh(V, [[0, 1, 2, 3]])
+    >>> round(6 * mesh.volume), mesh.surface.n_faces
+    (1, 4)
+    >>> sm.TetMesh(V, [[0, 2, 1, 3]], orient=True).n_turned
+    1
     """
 
     T: NDArray[np.int32]

@@ -26,6 +26,14 @@ class OverconstrainedElements:
         face with an interior edge is not listed, it goes with its edge.
     tets : (c,) ndarray of int32
         Tets at those edges and faces, ascending.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.mesh.overconstrained import overconstrained_elements
+    >>> found = overconstrained_elements(sm.samples.solid_double_torus(1))
+    >>> len(found.edges) > 0
+    True
     """
 
     edges: NDArray[np.int32]
@@ -56,6 +64,17 @@ def overconstrained_elements(solid: TetMesh) -> OverconstrainedElements:
         A face shared by more than two tets; ``ids`` are the tets.
     DegenerateError
         Tets that repeat a vertex; ``ids`` are the tets.
+
+    Examples
+    --------
+    A single layer of cubes has nothing but its boundary:
+
+    >>> import stretchmap as sm
+    >>> from stretchmap.mesh.overconstrained import overconstrained_elements
+    >>> len(overconstrained_elements(sm.samples.solid_double_torus(1))) > 0
+    True
+    >>> len(overconstrained_elements(sm.samples.solid_torus(1500)))
+    0
     """
     found = _core.mesh.BoundaryJoins(solid.T, solid.n_vertices)
     return OverconstrainedElements(found.edges, found.faces, found.tets)

@@ -44,6 +44,17 @@ class Refinement:
     halved : tuple of (c, 2) ndarrays of int32
         Edges halved after that, those of one pass in one array; their ends may have been added
         before.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> from stretchmap.mesh.refinement import refine_overconstrained
+    >>> plate = sm.samples.solid_double_torus(1)
+    >>> refined = refine_overconstrained(plate)
+    >>> heights = refined.prolong(plate.V[:, 2])
+    >>> bool(np.allclose(heights, refined.solid.V[:, 2]))
+    True
     """
 
     solid: TetMesh
@@ -141,6 +152,16 @@ def refine_overconstrained(solid: TetMesh) -> Refinement:
         A face shared by more than two tets; ``ids`` are the tets.
     DegenerateError
         Tets that repeat a vertex; ``ids`` are the tets.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.mesh.overconstrained import overconstrained_elements
+    >>> from stretchmap.mesh.refinement import refine_overconstrained
+    >>> plate = sm.samples.solid_double_torus(1)
+    >>> refined = refine_overconstrained(plate)
+    >>> len(overconstrained_elements(refined.solid)), refined.n_split > 0
+    (0, True)
     """
     found = _core.mesh.Refinement(solid.V, solid.T)
     joins = found.joins

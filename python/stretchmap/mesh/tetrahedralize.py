@@ -37,6 +37,10 @@ def tetrahedralize(
         Largest ratio of circumradius to shortest edge aimed at, above 1. Near the surface both
         aims may be missed, since the surface is not refined.
 
+    Returns
+    -------
+    TetMesh
+
     Raises
     ------
     MissingDependencyError
@@ -45,6 +49,17 @@ def tetrahedralize(
         If ``max_volume`` or ``quality`` is out of range.
     SolverError
         If the surface cannot be filled, as when it crosses itself, or was changed.
+
+    Notes
+    -----
+    A constrained Delaunay mesh, refined inside until its tets have the quality asked for (Si 2015,
+    TetGen); edges and faces of the surface are recovered and never split.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> surface = sm.samples.torus_surface(12, 6)
+    >>> solid = sm.samples.tetrahedralize(surface)  # doctest: +SKIP
     """
     surface, quality = as_surface(surface), real("quality", quality, above=1.0)
     if max_volume is not None:

@@ -77,6 +77,13 @@ class Partition(HasSummary):
     cumulative_errors : ndarray, shape (p - 1,)
         Uncorrected errors of the unions of the first 1, 2, ... parts, as in Table 7.1; empty for
         several coordinates.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> parts = sm.partition(sm.volume_map(sm.samples.solid_torus(600)), 3, by="u")
+    >>> parts.part(0).surface.genus, parts.interface(0, 1).n_faces > 0
+    (0, True)
     """
 
     by: tuple[Coordinate, ...]
@@ -233,6 +240,21 @@ def partition(
         If it is no map, or that of a surface.
     SolverError
         If the image has no volume to be divided.
+
+    Notes
+    -----
+    Section 7.2 of Yueh, Li, Lin, Yau (2020); the uncorrected errors are those of its Table 7.1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> result = sm.volume_map(sm.samples.solid_torus(600))
+    >>> shells = sm.partition(result, [0.2, 0.3, 0.5])
+    >>> bool(np.allclose(shells.volumes / result.mesh.volume, [0.2, 0.3, 0.5]))
+    True
+    >>> sm.partition(result, (2, 3), by=("s", "u")).n_parts
+    6
     """
     mapped, source = as_map_of_solid(result, "a partition")
     axes, shares = _asked(fractions, by, source.n_tets)

@@ -48,10 +48,23 @@ def solid_torus(n_tets: int = 20_000, R: float = 3.0, r: float = 1.0) -> TetMesh
     R, r : float
         Radius of the centre circle and of the tube, ``0 < r < R``.
 
+    Returns
+    -------
+    TetMesh
+
     Raises
     ------
     OptionError
         If the radii do not make a torus or fewer than 300 tets are asked for.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> solid
+    TetMesh(231 vertices, 594 tets)
+    >>> solid.surface.genus
+    1
     """
     torus = Torus(R, r)
     return swept(n_tets, TWO_PI * R / r, _revolved(torus, lambda u, v: 1.0 + 0.0 * u * v))
@@ -77,10 +90,21 @@ def bumpy_torus(
     waves : (int, int)
         Number of bumps the long and the short way round.
 
+    Returns
+    -------
+    TetMesh
+
     Raises
     ------
     OptionError
         If the parameters do not make a solid torus.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> flat, bumpy = (sm.samples.bumpy_torus(1000, amplitude=a) for a in (0.0, 0.25))
+    >>> bumpy.surface.area > flat.surface.area
+    True
     """
     torus = Torus(R, r)
     amplitude = real("amplitude", amplitude, 0.0, below=min(1.0, torus.ratio - 1.0))
@@ -107,11 +131,21 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
     p, q : int
         Coprime; turns about the axis and about the tube.
 
+    Returns
+    -------
+    TetMesh
+
     Raises
     ------
     OptionError
         If p, q are not coprime or the tube would touch itself; the message names the largest
         radius.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> trefoil = sm.samples.knot_tube(2000, radius=0.3)
+    >>> trefoil.require_solid_torus()  # knotted, and a solid torus all the same
     """
     p, q = (whole(name, x, 1, _MOST_WINDINGS) for name, x in (("p", p), ("q", q)))
     if math.gcd(p, q) != 1:
@@ -136,10 +170,20 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
 def ball(n: int = 6) -> TetMesh:
     """A ball of radius 1 (genus 0), from a cube of ``(2 n)^3`` cells.
 
+    Returns
+    -------
+    TetMesh
+
     Raises
     ------
     OptionError
         If ``n < 1``, or there is not the memory.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> sm.samples.ball(2).surface.genus
+    0
     """
     n = whole("n", n, 1)
     memory(f"a mesh of {48 * n**3} tets", _BYTES_PER_CELL * 8 * n**3)
@@ -158,10 +202,20 @@ def solid_double_torus(n: int = 2) -> TetMesh:
     n : int
         Cells per bar of the plate, at least 1.
 
+    Returns
+    -------
+    TetMesh
+
     Raises
     ------
     OptionError
         If ``n < 1``.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> sm.samples.solid_double_torus(1).surface.genus
+    2
     """
     plate = np.ones((5, 3, 1), bool)
     plate[[1, 3], 1] = False

@@ -26,10 +26,23 @@ def torus_surface(nu: int = 60, nv: int = 20, R: float = 3.0, r: float = 1.0) ->
     R, r : float
         Radii, ``0 < r < R``.
 
+    Returns
+    -------
+    TriMesh
+
     Raises
     ------
     OptionError
         If there are fewer than three vertices either way or the radii do not make a torus.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> surface = sm.samples.torus_surface(24, 12)
+    >>> surface
+    TriMesh(288 vertices, 576 faces)
+    >>> surface.euler
+    0
     """
     nu, nv = whole("nu", nu, 3), whole("nv", nv, 3)
     memory(f"a mesh of {2 * nu * nv} faces", _BYTES_PER_VERTEX * nu * nv)
@@ -41,10 +54,42 @@ def torus_surface(nu: int = 60, nv: int = 20, R: float = 3.0, r: float = 1.0) ->
 
 
 def sphere(n: int = 6) -> TriMesh:
-    """The unit sphere, ``48 n^2`` faces; the boundary of :func:`ball`."""
+    """The unit sphere, ``48 n^2`` faces; the boundary of :func:`ball`.
+
+    Returns
+    -------
+    TriMesh
+
+    Raises
+    ------
+    OptionError
+        If ``n < 1``.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> sm.samples.sphere(2).n_faces
+    192
+    """
     return ball(n).surface
 
 
 def double_torus(n: int = 2) -> TriMesh:
-    """A closed surface of genus 2, the boundary of :func:`solid_double_torus`."""
+    """A closed surface of genus 2, the boundary of :func:`solid_double_torus`.
+
+    Returns
+    -------
+    TriMesh
+
+    Raises
+    ------
+    OptionError
+        If ``n < 1``.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> sm.samples.double_torus(1).genus
+    2
+    """
     return solid_double_torus(n).surface

@@ -37,10 +37,21 @@ def vertebra_like(n_tets: int = 40_000, seed: int | None = None) -> TetMesh:
     seed : int, optional
         Draws the proportions of an individual; the standard one without.
 
+    Returns
+    -------
+    TetMesh
+
     Raises
     ------
     OptionError
         If fewer than 300 tets are asked for, or the seed is no integer from 0.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> one, other = (sm.samples.vertebra_like(600, seed=seed) for seed in (0, 1))
+    >>> bool((one.V == other.V).all())
+    False
     """
     if seed is not None:
         seed = whole("seed", seed, 0)
@@ -59,6 +70,13 @@ class VertebraPair:
         Where each source vertex lies in the target individual.
     source_landmarks, target_landmarks : ndarray of int, shape (k,)
         Boundary vertices of source and target that correspond exactly.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> pair = sm.samples.vertebra_pair(n_landmarks=3, n_tets=(600, 800))
+    >>> pair.truth.shape == pair.source.V.shape
+    True
     """
 
     source: TetMesh
@@ -85,10 +103,23 @@ def vertebra_pair(
     n_tets : (int, int)
         Number of tets aimed at, source and target.
 
+    Returns
+    -------
+    VertebraPair
+
     Raises
     ------
     OptionError
         If the number of landmarks or of tets, or the seed, is out of range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> pair = sm.samples.vertebra_pair(n_landmarks=3, n_tets=(600, 800))
+    >>> ends = pair.truth[pair.source_landmarks], pair.target.V[pair.target_landmarks]
+    >>> bool(np.allclose(*ends))
+    True
     """
     stations, sixths = 12, 6
     n_landmarks = whole("n_landmarks", n_landmarks, 0, stations * sixths)

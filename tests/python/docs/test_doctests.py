@@ -1,0 +1,37 @@
+"""The examples in the docstrings run and show what they say; every public name has one."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import pkgutil
+from types import ModuleType
+
+import pytest
+
+import stretchmap
+
+OPTIONAL = {"plot": "matplotlib", "cli": "typer"}
+
+
+def modules() -> list[str]:
+    found = pkgutil.walk_packages(stretchmap.__path__, "stretchmap.")
+    return sorted(i.name for i in found if "_core" not in i.name and "__main__" not in i.name)
+
+
+def load(name: str) -> ModuleType:
+    for room, package in OPTIONAL.items():
+        if name.startswith(f"stretchmap.{room}"):
+            pytest.importorskip(package)
+    return importlib.import_module(name)
+
+
+@pytest.mark.parametrize("name", modules())
+def test_examples(name):
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    text: list[str] = []
+    module = load(name)
+    for example in finder.find(module, name):
+        runner.run(example, out=text.append)
+    assert not runner.failures, "".join(text)
