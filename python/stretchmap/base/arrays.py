@@ -239,7 +239,7 @@ def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
 
 def _as_doubles(raw: NDArray[Any], name: str) -> NDArray[np.float64]:
     with np.errstate(over="ignore"):
-        doubles = np.ascontiguousarray(raw, np.float64)
+        doubles = np.asarray(raw, np.float64, order="C")
     if raw.dtype.itemsize > 8 and (np.isinf(doubles) & np.isfinite(raw)).any():
         raise NonFiniteError(f"{name} has values beyond double precision; scale them")
     return doubles

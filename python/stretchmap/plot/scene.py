@@ -58,11 +58,11 @@ def cut(
     MissingDependencyError
         PyVista is not installed.
     """
-    result, _ = as_map_of_solid(result, "a cut")
+    result, solid = as_map_of_solid(result, "a cut")
     one_of("color", color, tuple(_COLORS))
     pv = _pyvista()
-    grid = pv.UnstructuredGrid({pv.CellType.TETRA: result.mesh.T}, np.asarray(result.image))
-    place = principal(result.mesh.V, result.mesh.V)[:, 0]
+    grid = pv.UnstructuredGrid({pv.CellType.TETRA: solid.T}, result.image)
+    place = principal(solid.V, solid.V)[:, 0]
     grid.point_data["coordinate"] = place
     grid.cell_data["ratio"] = result.distortion.ratios
     half = grid.clip("y", origin=(0.0, 0.0, 0.0), invert=False)

@@ -83,3 +83,10 @@ def test_bad_arguments():
         Torus.from_ratio(0.5)
     with pytest.raises(ArrayError):
         torus.coordinates([1.0, 2.0])
+
+
+def test_one_point_has_no_further_axis():
+    torus = Torus(3.0, 1.0)
+    assert torus.xi(0.0, 0.0).tolist() == [4.0, 0.0, 0.0]
+    assert torus.normal(0.0, 0.0).shape == (3,)
+    assert [angle.shape for angle in torus.coordinates([3.5, 0.0, 0.0])] == [(), (), ()]
