@@ -182,10 +182,20 @@ def partition(
 def resample(
     map_file: MapFile,
     output: Output,
-    sections: Annotated[int, typer.Option(help="Hexahedra round the axis.")] = 64,
-    block: Annotated[int, typer.Option(help="Hexahedra along a side of the middle block.")] = 4,
-    rings: Annotated[int, typer.Option(help="Layers between block and boundary.")] = 4,
-    repair: Annotated[bool, typer.Option(help="Make all hexahedra valid.")] = True,
+    n_hexahedra: Annotated[
+        int | None, typer.Option(help="About so many hexahedra [default: 5000].")
+    ] = None,
+    target_size: Annotated[
+        float | None, typer.Option(help="Instead: side of a cube of their mean volume.")
+    ] = None,
+    sections: Annotated[int | None, typer.Option(help="Hexahedra round the axis.")] = None,
+    block: Annotated[
+        int | None, typer.Option(help="Hexahedra along a side of the middle block.")
+    ] = None,
+    rings: Annotated[int | None, typer.Option(help="Layers between block and boundary.")] = None,
+    optimize: Annotated[
+        bool, typer.Option(help="Optimize the hexahedra's shape and the boundary's fit.")
+    ] = True,
     json: Json = None,
     quiet: Quiet = False,
 ) -> int:
@@ -201,7 +211,14 @@ def resample(
     result = _solid_map(map_file, "resample")
     with terminal(quiet) as bar:
         mesh = hex_mesh(
-            result, sections=sections, block=block, rings=rings, repair=repair, progress=bar
+            result,
+            n_hexahedra=n_hexahedra,
+            target_size=target_size,
+            sections=sections,
+            block=block,
+            rings=rings,
+            optimize=optimize,
+            progress=bar,
         )
     common.write_together(output, mesh.save, json, mesh.to_dict())
     if not quiet:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..base.torus import TWO_PI
@@ -60,6 +61,46 @@ def swept_layout(sections: int, block: int, rings: int) -> Layout:
     )
 
 
+def prolongation(sections: int, block: int, rings: int) -> sp.csr_array:
+    """Points of the layout with all three numbers doubled as means of those of the layout.
+
+    Every hexahedron is split into eight parts of its trilinear map, valid if it is.
+
+    Returns
+    -------
+    csr_array, shape (n', n)
+    """
+    side = block + 1
+    rim = _rim(np.arange(side * side).reshape(side, side))
+    layers = np.concatenate(
+        [rim[None], side * side + np.arange(rings * len(rim)).reshape(rings, -1)]
+    )
+    along = _halved(side)
+    to_square = sp.kron(along, along)
+    around = sp.kron(_halved(rings + 1)[[*range(1, 2 * rings + 1)]], _halved(len(rim), cyclic=True))
+    select = sp.csr_array(
+        (np.ones(layers.size), (np.arange(layers.size), layers.ravel())),
+        shape=(layers.size, side * side + rings * len(rim)),
+    )
+    pad = sp.csr_array((to_square.shape[0], rings * len(rim)))
+    disk = sp.vstack([sp.hstack([to_square, pad]), around @ select])
+    return sp.csr_array(sp.kron(_halved(sections, cyclic=True), disk))
+
+
+def _halved(n: int, cyclic: bool = False) -> sp.csr_array:
+    """Places and middles of n points in a row, or round a circle."""
+    half = sp.eye_array(n, format="csr")
+    ahead = sp.csr_array((np.ones(n), (np.arange(n), (np.arange(n) + 1) % n)), shape=(n, n))
+    rows = sp.vstack([half, 0.5 * (half + ahead)], format="csr")
+    order = np.arange(2 * n).reshape(2, n).T.ravel()
+    return rows[order if cyclic else order[:-1]]
+
+
+def _rim(index: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The outer points of a square of points, in order round it."""
+    return np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
+
+
 def _disk(
     block: int, rings: int
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.int32], NDArray[np.int32]]:
@@ -72,7 +113,7 @@ def _disk(
     square = np.stack([x, y], axis=1) * (0.5 + 0.5 * round_off)[:, None] * _SQUARE / np.sqrt(2.0)
     index = np.arange((block + 1) ** 2).reshape(block + 1, block + 1)
     inner = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1)
-    rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
+    rim = _rim(index)
     start = square[rim]
     angle = np.arctan2(start[:, 1], start[:, 0])
     end = np.stack([np.cos(angle), np.sin(angle)], axis=1)

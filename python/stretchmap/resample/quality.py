@@ -14,29 +14,32 @@ if TYPE_CHECKING:
 
 _PER_SIDE = 4
 
-# Corner of a hexahedron and the three corners joined to it, positively oriented.
-CORNERS = np.array(
-    [[0, 1, 3, 4], [1, 2, 0, 5], [2, 3, 1, 6], [3, 0, 2, 7],
-     [4, 7, 5, 0], [5, 4, 6, 1], [6, 5, 7, 2], [7, 6, 4, 3]]
-)  # fmt: skip
 # Faces, seen from outside.
 FACES = np.array(
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 )
-# Parallel edges, one row for each of the three directions, and the directions of CORNERS' edges.
+# Parallel edges, one row for each of the three directions.
 EDGES = np.array(
     [[[0, 1], [3, 2], [4, 5], [7, 6]],
      [[0, 3], [1, 2], [4, 7], [5, 6]],
      [[0, 4], [1, 5], [2, 6], [3, 7]]]
 )  # fmt: skip
-DIRECTIONS = np.array(
-    [[0, 1, 2], [1, 0, 2], [0, 1, 2], [1, 0, 2], [1, 0, 2], [0, 1, 2], [1, 0, 2], [0, 1, 2]]
-)
 
 
-def corner_tets(H: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(8 k, 4) tets of the corners and their three neighbours."""
-    return np.ascontiguousarray(H[:, CORNERS].reshape(-1, 4))
+def vertex_normals(surface: TriMesh) -> NDArray[np.float64]:
+    """(n, 3) unit normals, means of the faces' weighted by their angles."""
+    V, F = surface.V, surface.F
+    edges = [V[F[:, (k + 1) % 3]] - V[F[:, k]] for k in range(3)]
+    normals = np.cross(edges[0], -edges[2])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    total = np.zeros_like(V)
+    for k in range(3):
+        first, second = edges[k], -edges[k - 1]
+        sine = np.linalg.norm(np.cross(first, second), axis=1)
+        angle = np.arctan2(sine, (first * second).sum(axis=1))
+        for axis in range(3):
+            total[:, axis] += np.bincount(F[:, k], angle * normals[:, axis], minlength=len(V))
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 
 def boundary_quads(H: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -1,0 +1,169 @@
+"""Hexahedra of good shape whose boundary fits the surface of the solid.
+
+The energy of the grid (`hex_energy.hpp`) has two parts: the distortion of every corner against a
+box with the mean sides of the hexahedra round it, and squared distances between the grid's boundary
+and the surface, seen from both. The boundary glides along the surface at no cost and lies about it,
+now outside, now inside, so that the volume comes out right; points held on a curved surface would
+enclose less than it does. First corners that are not positive are turned by a regularized energy
+(Garanzha et al., ACM TOG 40(4), 2021), then a barrier keeps them while the worst count more and
+more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.progress import Progress, report
+from ..mesh.meshes import TriMesh
+from .quality import EDGES, boundary_quads, vertex_normals
+
+__all__ = ["GridOptimizer", "Schedule"]
+
+_VOLUME_WEIGHT = 0.1
+_LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
+_STEPS = 3  # Newton steps between two looks at boxes and samples
+_SMOOTHING = 5  # rounds that the logarithms of the boxes' sides are averaged
+_PER_SIDE = 3  # samples of a quad, squared
+_FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
+_LOOSE = 0.5  # share of it while corners are not positive
+_TOLERANCE = 0.005  # of the diagonal: larger gaps count more and more ...
+_MOST_BOOST = 30.0  # ... up to this
+_LOOSER = 0.6  # factor of the fit where it is in the way
+_HARDER = 2.0  # factor of the weight of a hexahedron each time it is found invalid
+_INVALID_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How long to go on.
+
+    Attributes
+    ----------
+    untangle : int
+        Most rounds until all corners are positive.
+    powers : tuple of float
+        Power p of each round after that, see `hex_energy.hpp`.
+    """
+
+    untangle: int = 40
+    powers: tuple[float, ...] = (1.0,) * 8 + (1.5,) * 4 + (2.0,) * 4 + (3.0,) * 6
+
+
+class GridOptimizer:
+    """A grid on its way.
+
+    Parameters
+    ----------
+    V : ndarray, shape (n, 3)
+    H : ndarray of int32, shape (k, 8)
+    surface : TriMesh
+        Boundary of the solid.
+
+    Attributes
+    ----------
+    V : ndarray, shape (n, 3)
+        Replaced as the grid gets better.
+    """
+
+    def __init__(self, V: NDArray[np.float64], H: NDArray[np.int32], surface: TriMesh) -> None:
+        self.V, self.H = np.array(V), H
+        self._counts = np.bincount(H.ravel(), minlength=len(V))
+        self._newton = _core.resample.HexNewton(H, len(V))
+        quads = boundary_quads(H)
+        count = _PER_SIDE**2 * len(quads)
+        self._fit = _core.resample.BoundaryFit(
+            surface.V, surface.F, vertex_normals(surface), *_spread(surface, count), quads,
+            _PER_SIDE,
+        )  # fmt: skip
+        self._strength = _FIT * len(quads) / surface.area
+        self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
+        self._weights = np.full(len(H), 1.0 / len(H))
+
+    def run(self, schedule: Schedule, progress: Progress | None = None) -> None:
+        """All stages; stops early where corners cannot be made positive.
+
+        Raises
+        ------
+        SolverError
+            A linear solve broke down.
+        """
+        if not self._untangle(schedule.untangle, progress):
+            return
+        done, total = 0, len(schedule.powers)
+        for power in schedule.powers:
+            report(progress, "optimize", done, total, power=power)
+            self._round(power)
+            done += 1
+        for done in range(_INVALID_ROUNDS):
+            invalid = _core.resample.valid_hexes(self.V, self.H) == 0
+            report(progress, "validity", done, _INVALID_ROUNDS, invalid=int(invalid.sum()))
+            if not invalid.any():
+                break
+            # Harder on these, and the boundary gives way.
+            self._weights[invalid] *= _HARDER
+            self._prepare(_LOOSER ** (done + 1), 0.0)
+            self._step(0.0, schedule.powers[-1])
+
+    def _untangle(self, rounds: int, progress: Progress | None) -> bool:
+        """Whether all corners are positive."""
+        strength, least = _LOOSE, len(self.V) * 8
+        for done in range(rounds + 1):
+            self._prepare(strength, 0.0)
+            start = self._newton.value(self.V, _corner(1.0))
+            report(progress, "untangle", done, rounds, bad=start.flips)
+            if start.flips == 0:
+                return True
+            # A fit that holds corners where they cannot be turned is loosened.
+            if start.flips >= least:
+                strength *= _LOOSER
+            least = min(least, start.flips)
+            if done < rounds:
+                size = 0.5 * abs(start.min_det)
+                self._step(float(np.clip(size, _LEAST_EPSILON, _LARGEST_EPSILON)), 1.0)
+        return False
+
+    def _round(self, power: float) -> None:
+        # What the shape gains in weight, the fit gains, too.
+        self._prepare(np.sqrt(power), _MOST_BOOST)
+        self._step(0.0, power)
+
+    def _step(self, epsilon: float, power: float) -> None:
+        self.V, _ = self._newton.run(self.V, _corner(epsilon), power, _STEPS)
+
+    def _prepare(self, strength: float, boost: float) -> None:
+        """Boxes and samples of the boundary for the present points."""
+        self._newton.set_rest(self._sides(), self._weights)
+        samples = self._fit.match(self.V)
+        factor = 1.0 + np.minimum((samples.distance / self._tolerance) ** 2, boost)
+        self._newton.set_fit(samples, strength * self._strength * samples.share * factor)
+
+    def _sides(self) -> NDArray[np.float64]:
+        """(k, 3) mean lengths of parallel edges, smoothed over the hexahedra round each point."""
+        ends = self.V[self.H[:, EDGES]]  # (k, 3, 4, 2, 3)
+        lengths = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1).mean(axis=-1)
+        logs = np.log(np.maximum(lengths, 1e-12 * lengths.max()))
+        corners = self.H.ravel()
+        for _ in range(_SMOOTHING):
+            sums = [np.bincount(corners, np.repeat(column, 8)) for column in logs.T]
+            logs = (np.stack(sums, axis=1) / self._counts[:, None])[self.H].mean(axis=1)
+        return np.ascontiguousarray(np.exp(logs))
+
+
+def _corner(epsilon: float) -> _core.volume.EnergyWeights:
+    return _core.volume.EnergyWeights(1.0, _VOLUME_WEIGHT, epsilon)
+
+
+def _spread(surface: TriMesh, count: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Faces (count,) and weights (count, 3) of points at even steps of area along the faces."""
+    ends = np.cumsum(surface.face_areas)
+    faces = np.searchsorted(ends, (np.arange(count) + 0.5) / count * ends[-1])
+    faces = np.minimum(faces, surface.n_faces - 1)
+    # Inside a face a sequence of low discrepancy (Roberts' R2), folded into the triangle.
+    a, b = (np.arange(1, count + 1)[:, None] * [0.7548776662466927, 0.5698402909980532] % 1.0).T
+    out = a + b > 1.0
+    a, b = np.where(out, 1.0 - a, a), np.where(out, 1.0 - b, b)
+    return faces.astype(np.int32), np.ascontiguousarray(np.stack([1.0 - a - b, a, b], axis=1))
