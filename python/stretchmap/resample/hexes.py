@@ -107,9 +107,9 @@ def hex_mesh(
     0
     """
     result, solid = as_map_of_solid(result, "a grid of hexahedra")
-    numbers = _numbers(
-        solid.volume, torus_of(result).ratio, n_hexahedra, target_size, sections, block, rings
-    )
+    callback("progress", progress)
+    torus = torus_of(result)
+    numbers = _numbers(solid.volume, torus.ratio, n_hexahedra, target_size, sections, block, rings)
     count = numbers[0] * numbers[1] * (numbers[1] + 4 * numbers[2])
     memory(f"a grid of {count} hexahedra", _BYTES_PER_HEX * count)
     levels = 0
@@ -129,9 +129,8 @@ def hex_mesh(
             V, pulled = (np.ascontiguousarray(finer @ points) for points in (V, pulled))
             V = _optimized(V, layout.H, solid, _FINER, progress)
         if levels:
-            torus = torus_of(result)
             grid = torus.xi(layout.u, layout.v, layout.share * torus.r)
-    return _measured(result, layout, grid, pulled, V, n_invalid)
+    return _measured(solid, torus, layout, grid, pulled, V, n_invalid)
 
 
 def _numbers(
@@ -152,7 +151,10 @@ def _numbers(
         wanted = volume / size**3
     else:
         wanted = whole("n_hexahedra", 5000 if n_hexahedra is None else n_hexahedra, 12)
-    chosen = grid_numbers(ratio, max(wanted, 12.0))
+    wanted, levels = max(wanted, 12.0), 0
+    while wanted > _COARSE * 8**levels:
+        levels += 1
+    chosen = tuple(2**levels * k for k in grid_numbers(ratio, wanted / 8**levels))
     names, least = ("sections", "block", "rings"), (3, 1, 1)
     for k in range(3):
         value = chosen[k] if given[k] is None else given[k]

@@ -119,7 +119,7 @@ def test_distances_between_a_cube_and_its_shell():
 def grid():
     solid = samples.solid_torus(4000, R=3.0, r=1.0)
     result = a_map(solid, solid.V, sm.Torus(3.0, 1.0))
-    return hex_mesh(result, sections=12, block=2, rings=2, repair=False)
+    return hex_mesh(result, sections=12, block=2, rings=2, optimize=False)
 
 
 @pytest.mark.parametrize("suffix", [".vtu", ".vtk", ".msh"])
