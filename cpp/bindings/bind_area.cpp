@@ -1,13 +1,13 @@
 #include "arrays.hpp"
 #include "stretchmap/area/chart.hpp"
+#include "stretchmap/area/chart_newton.hpp"
 #include "stretchmap/area/surface_newton.hpp"
 #include "stretchmap/area/surface_quality.hpp"
 #include "stretchmap/area/surface_sem.hpp"
+#include "stretchmap/certificate/torus_graph.hpp"
 
 namespace stretchmap::area {
 namespace {
-
-SurfaceWeights weights_of(double area, double shape, double chart) { return {area, shape, chart}; }
 
 void bind_chart(py::module_& m) {
   py::class_<SurfaceChart>(m, "SurfaceChart")
@@ -42,6 +42,26 @@ void bind_sem(py::module_& m) {
       .def_property_readonly("turns", &SurfaceSem::turns);
 }
 
+void bind_chart_newton(py::module_& m) {
+  py::class_<ChartStep>(m, "ChartStep")
+      .def_readonly("before", &ChartStep::before)
+      .def_readonly("after", &ChartStep::after)
+      .def_readonly("step", &ChartStep::step)
+      .def_readonly("decrement", &ChartStep::decrement)
+      .def_readonly("reached", &ChartStep::reached);
+  py::class_<ChartNewton>(m, "ChartNewton")
+      .def(py::init<SurfaceChart, SurfaceReference, double, Points2>(), py::arg("chart"),
+           py::arg("reference"), py::arg("aspect"), py::arg("turns"), release_gil())
+      .def(
+          "step",
+          [](ChartNewton& self, double area, double shape, double reach, int mix) {
+            return self.step(area, shape, reach, mix, signal_poll());
+          },
+          py::arg("area"), py::arg("shape"), py::arg("reach"), py::arg("mix")=0, release_gil())
+      .def("figures", &ChartNewton::figures, release_gil())
+      .def_property_readonly("turns", &ChartNewton::turns);
+}
+
 void bind_quality(py::module_& m) {
   py::class_<SurfaceReference>(m, "SurfaceReference")
       .def(py::init([](const PointsRef& points, const FacesRef& faces) {
@@ -61,12 +81,10 @@ void bind_quality(py::module_& m) {
 
 void bind_glide(py::module_& m) {
   py::class_<GlideProblem>(m, "GlideProblem")
-      .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio,
-                       bool facing) {
-             return GlideProblem{chart, reference, ratio, facing};
+      .def(py::init([](const SurfaceChart& chart, const SurfaceReference& reference, double ratio) {
+             return GlideProblem{chart, reference, ratio};
            }),
-           py::arg("chart"), py::arg("reference"), py::arg("ratio"), py::arg("facing") = false,
-           release_gil());
+           py::arg("chart"), py::arg("reference"), py::arg("ratio"), release_gil());
   py::class_<GlideStep>(m, "GlideStep")
       .def_readonly("before", &GlideStep::before)
       .def_readonly("after", &GlideStep::after)
@@ -76,20 +94,25 @@ void bind_glide(py::module_& m) {
       .def(py::init<GlideProblem, Points2>(), py::arg("problem"), py::arg("angles"), release_gil())
       .def(
           "step",
-          [](SurfaceNewton& self, double area, double shape, double chart) {
-            return self.step(weights_of(area, shape, chart), signal_poll());
+          [](SurfaceNewton& self, double area, double shape, double chart, double facing,
+             double epsilon) {
+            return self.step({area, shape, chart, facing, epsilon}, signal_poll());
           },
-          py::arg("area"), py::arg("shape"), py::arg("chart"), release_gil())
+          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("facing"),
+          py::arg("epsilon"), release_gil())
       .def(
           "project_rings",
-          [](SurfaceNewton& self, double area, double shape, double chart, double face_sd,
-             double face_error) {
-            return self.project_rings(weights_of(area, shape, chart), face_sd, face_error,
+          [](SurfaceNewton& self, double area, double shape, double chart, double facing,
+             double face_sd, double face_error) {
+            return self.project_rings({area, shape, chart, facing, 0.0}, face_sd, face_error,
                                       signal_poll());
           },
-          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("face_sd"),
+          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("facing"),
+          py::arg("face_sd"),
           py::arg("face_error"), release_gil())
       .def("figures", &SurfaceNewton::figures, release_gil())
+      .def("least_facing", [](const SurfaceNewton& self) { return least_facing(self.problem(), self.angles()); }, release_gil())
+      .def("folds", [](const SurfaceNewton& self) { return certificate::torus_graph(glide_image(self.problem(), self.angles()), self.problem().chart.faces, std::sqrt(self.problem().ratio) / 6.283185307179586).bad; }, release_gil())
       .def_property_readonly("angles", &SurfaceNewton::angles);
 }
 
@@ -100,6 +123,7 @@ void bind(py::module_& m) {
   bind_sem(m);
   bind_quality(m);
   bind_glide(m);
+  bind_chart_newton(m);
 }
 
 }  // namespace stretchmap::area

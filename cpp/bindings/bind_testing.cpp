@@ -34,10 +34,6 @@ Vec solve_once(const SparseMatrix& matrix, const VecRef& right) {
   return factor.solve(right);
 }
 
-area::SurfaceWeights weights_of(double area, double shape, double chart) {
-  return {area, shape, chart};
-}
-
 void bind_mesh(py::module_& m) {
   m.def("orient3d", &orient3d, py::arg("a"), py::arg("b"), py::arg("c"), py::arg("d"));
   m.def("orient2d", &orient2d, py::arg("a"), py::arg("b"), py::arg("c"), py::arg("axis"));
@@ -130,17 +126,18 @@ void bind_area(py::module_& m) {
   m.def(
       "glide_energy",
       [](const area::GlideProblem& problem, double area, double shape, double chart, double scale,
-         const Points2Ref& angles, bool model) {
-        area::GlideEnergy energy =
-            area::glide_energy(problem, weights_of(area, shape, chart), scale, angles,
-                               model ? area::Derivatives::kModel : area::Derivatives::kHessian);
+         const Points2Ref& angles, bool model, double facing, double epsilon) {
+        area::GlideEnergy energy = area::glide_energy(
+            problem, {area, shape, chart, facing, epsilon}, scale, angles,
+            model ? area::Derivatives::kModel : area::Derivatives::kHessian);
         const area::SurfacePattern pattern(problem.chart.faces, problem.chart.n_vertices, 2);
         SparseMatrix hessian = pattern.zeros();
         pattern.scatter(energy.hessians, hessian.valuePtr());
         return std::make_tuple(energy.value, std::move(energy.gradient), std::move(hessian));
       },
       py::arg("problem"), py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("scale"),
-      py::arg("angles").noconvert(), py::arg("model") = false, release_gil());
+      py::arg("angles").noconvert(), py::arg("model") = false, py::arg("facing") = 0.0,
+      py::arg("epsilon") = 0.0, release_gil());
   m.def("best_scale", &area::best_scale, py::arg("problem"), py::arg("angles").noconvert(),
         release_gil());
   m.def("glide_areas", &area::glide_areas, py::arg("problem"), py::arg("angles").noconvert(),

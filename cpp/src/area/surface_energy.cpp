@@ -1,10 +1,12 @@
 #include "stretchmap/area/surface_energy.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "area/face_jet.hpp"
+#include "area/facing.hpp"
 
 namespace stretchmap::area {
 
@@ -71,33 +73,6 @@ Jet chart_jet(const Eigen::Vector2d (&angle)[3], double tube_ratio, bool second)
   return jet;
 }
 
-Eigen::Vector3d area_vector(const TorusPoint (&p)[3]) {
-  return 0.5 * (p[1].point - p[0].point).cross(p[2].point - p[0].point);
-}
-
-Eigen::Vector3d outward(const TorusPoint& p) {
-  return p.tangent.col(0).cross(p.tangent.col(1)).normalized();
-}
-
-// Component of the area vector along the torus' normal at corner k; no second derivatives.
-Jet facing_jet(const TorusPoint (&p)[3], int k) {
-  const Eigen::Vector3d area = area_vector(p), normal = outward(p[k]);
-  Jet jet;
-  jet.value = area.dot(normal);
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d by_point =
-        0.5 * (p[(i + 1) % 3].point - p[(i + 2) % 3].point).cross(normal);
-    jet.gradient.segment<2>(2 * i) = p[i].tangent.transpose() * by_point;
-  }
-  // Along a principal circle the normal turns by its normal curvature times the tangent.
-  const Eigen::Vector3d eu = p[k].tangent.col(0), ev = p[k].tangent.col(1);
-  const double bend_u = -p[k].uu.dot(normal) / eu.squaredNorm();
-  const double bend_v = -p[k].vv.dot(normal) / ev.squaredNorm();
-  jet.gradient[2 * k] += bend_u * area.dot(eu);
-  jet.gradient[2 * k + 1] += bend_v * area.dot(ev);
-  return jet;
-}
-
 // Adds weight (x + 1/x - 2), x = jet / unit. `curvature` multiplies the jet's own second
 // derivatives: 1 is exact, 0 Gauss-Newton.
 void add_barrier(const Jet& jet, double unit, double weight, double curvature, bool second,
@@ -109,6 +84,25 @@ void add_barrier(const Jet& jet, double unit, double weight, double curvature, b
   if (!second) return;
   const double bend = weight * 2.0 / (x * x * x * unit * unit);
   sum.hessian += bend * jet.gradient * jet.gradient.transpose() + curvature * slope * jet.hessian;
+}
+
+// Adds weight ((x^2 + 1) / chi(x) - 2), x = jet / unit: finite where a face looks inward as long as
+// epsilon > 0.
+void add_facing(const Jet& jet, double unit, double weight, double epsilon, bool second, Jet& sum) {
+  const double x = jet.value / unit;
+  const double root = std::sqrt(x * x + epsilon * epsilon);
+  const double chi = epsilon <= 0.0 ? x
+                     : x >= 0.0     ? 0.5 * (x + root)
+                                    : 0.5 * epsilon * epsilon / (root - x);
+  const double rate = epsilon <= 0.0 ? 1.0 : chi / root;  // d chi / dx
+  const double q = 1.0 / chi, t = rate * q;
+  sum.value += weight * ((x * x + 1.0) * q - 2.0);
+  const double slope = weight * q * (2.0 * x - (x * x + 1.0) * t) / unit;
+  sum.gradient += slope * jet.gradient;
+  if (!second) return;
+  const double bend = 2.0 * weight * q * ((1.0 - x * t) * (1.0 - x * t) + t * t) / (unit * unit);
+  sum.hessian += bend * jet.gradient * jet.gradient.transpose();
+  if (epsilon < 0.2) sum.hessian += slope * jet.hessian;
 }
 
 // Adds weight (d / (2 a) - 1).
@@ -156,14 +150,17 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
   }
   add_barrier(area, scale * size, weights.area * size, curvature, second, sum);
   if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * size, 1.0, second, sum);
-  for (int k = 0; problem.facing && k < 3; ++k) {
-    const Jet facing = facing_jet(p, k);
-    if (!(facing.value > 0.0)) {
+  if (weights.facing > 0.0) {
+    const double tube = tube_radius(problem.ratio);
+    const Facing outward = facing(p, problem.ratio * tube, tube, second);
+    if (weights.epsilon <= 0.0 && !(outward.least.value > 0.0)) {
       sum.value = std::numeric_limits<double>::infinity();
       return sum;
     }
-    if (weights.chart > 0.0)
-      add_barrier(facing, size, weights.chart / 3.0 * size, 0.0, second, sum);
+    const double weight = 0.25 * weights.facing * size;
+    add_facing(outward.least, size, weight, weights.epsilon, second, sum);
+    for (const Jet& corner : outward.corner)
+      add_facing(corner, size, weight, weights.epsilon, second, sum);
   }
   if (weights.shape > 0.0)
     add_shape(dirichlet_jet(p, problem.reference.cotan.row(f), second), area, weights.shape * size,
@@ -209,15 +206,17 @@ Points glide_image(const GlideProblem& problem, const Points2Ref& angles) {
   return image;
 }
 
-bool all_facing(const GlideProblem& problem, const Points2Ref& angles) {
+double least_facing(const GlideProblem& problem, const Points2Ref& angles) {
   const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  const double tube = tube_radius(problem.ratio);
+  double least = std::numeric_limits<double>::infinity();
   for (Index f = 0; f < problem.chart.faces.rows(); ++f) {
     TorusPoint p[3];
     for (int k = 0; k < 3; ++k) p[k] = points[problem.chart.faces(f, k)];
-    for (int k = 0; k < 3; ++k)
-      if (!(area_vector(p).dot(outward(p[k])) > 0.0)) return false;
+    const double value = facing(p, problem.ratio * tube, tube, false).least.value;
+    least = std::min(least, value / problem.reference.areas(f));
   }
-  return true;
+  return least;
 }
 
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles) {

@@ -49,7 +49,6 @@ SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
   if (!faces.empty())
     throw Error("SolverError", "faces are flipped in the chart; Newton steps need a start without",
                 faces);
-  problem_.facing = all_facing(problem_, angles_);
 }
 
 GlideStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {

@@ -35,8 +35,13 @@ inline TorusPoint torus_point(double axis, double tube, double u, double v) {
   return p;
 }
 
+// Of the torus of area one.
+inline double tube_radius(double ratio) {
+  return 1.0 / (6.283185307179586476925287 * std::sqrt(ratio));
+}
+
 inline std::vector<TorusPoint> torus_points(double ratio, const Points2Ref& angles) {
-  const double tube = 1.0 / (6.283185307179586476925287 * std::sqrt(ratio));
+  const double tube = tube_radius(ratio);
   std::vector<TorusPoint> points(static_cast<std::size_t>(angles.rows()));
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < static_cast<Index>(angles.rows()); ++i)

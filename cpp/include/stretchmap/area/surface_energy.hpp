@@ -24,13 +24,14 @@ struct SurfaceWeights {
   double area = 1.0;
   double shape = 0.0;
   double chart = 0.0;
+  double facing = 0.0;
+  double epsilon = 0.0;  // of the facing term; 0: infinite where a face looks inward
 };
 
 struct GlideProblem {
   SurfaceChart chart;
   SurfaceReference reference;
   double ratio = 2.0;   // R / r
-  bool facing = false;  // whether faces are kept from turning inward at their corners
 };
 
 struct GlideEnergy {
@@ -52,8 +53,9 @@ double best_scale(const GlideProblem& problem, const Points2Ref& angles);
 // (n, 3) points of the torus of area one.
 Points glide_image(const GlideProblem& problem, const Points2Ref& angles);
 
-// Whether every flat image face looks outward at all its corners.
-bool all_facing(const GlideProblem& problem, const Points2Ref& angles);
+// Least of the faces' least component of the area vector along the torus' normal over the source
+// area: positive where the certificate's condition holds on every face.
+double least_facing(const GlideProblem& problem, const Points2Ref& angles);
 
 // (m) areas of the polyhedral image; the torus itself has area one.
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles);
