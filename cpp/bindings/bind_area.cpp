@@ -1,10 +1,11 @@
+#include <limits>
+
 #include "arrays.hpp"
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/chart_newton.hpp"
 #include "stretchmap/area/surface_newton.hpp"
 #include "stretchmap/area/surface_quality.hpp"
 #include "stretchmap/area/surface_sem.hpp"
-#include "stretchmap/certificate/torus_graph.hpp"
 
 namespace stretchmap::area {
 namespace {
@@ -48,26 +49,27 @@ void bind_chart_newton(py::module_& m) {
       .def_readonly("after", &ChartStep::after)
       .def_readonly("step", &ChartStep::step)
       .def_readonly("decrement", &ChartStep::decrement)
-      .def_readonly("reached", &ChartStep::reached);
+      .def_readonly("within", &ChartStep::within);
   py::class_<ChartNewton>(m, "ChartNewton")
       .def(py::init<SurfaceChart, SurfaceReference, double, Points2>(), py::arg("chart"),
            py::arg("reference"), py::arg("aspect"), py::arg("turns"), release_gil())
       .def(
           "step",
-          [](ChartNewton& self, double area, double shape, double reach, int mix) {
-            return self.step(area, shape, reach, mix, signal_poll());
+          [](ChartNewton& self, double area, double shape, double reach) {
+            return self.step({shape, area}, reach, signal_poll());
           },
-          py::arg("area"), py::arg("shape"), py::arg("reach"), py::arg("mix")=0, release_gil())
+          py::arg("area"), py::arg("shape"), py::arg("reach"), release_gil())
       .def("figures", &ChartNewton::figures, release_gil())
       .def_property_readonly("turns", &ChartNewton::turns);
 }
 
 void bind_quality(py::module_& m) {
   py::class_<SurfaceReference>(m, "SurfaceReference")
-      .def(py::init([](const PointsRef& points, const FacesRef& faces) {
-             return surface_reference(points, faces);
+      .def(py::init([](const PointsRef& points, const FacesRef& faces, double max_aspect) {
+             return surface_reference(points, faces, max_aspect);
            }),
-           py::arg("points").noconvert(), py::arg("faces").noconvert(), release_gil())
+           py::arg("points").noconvert(), py::arg("faces").noconvert(),
+           py::arg("max_aspect") = std::numeric_limits<double>::infinity(), release_gil())
       .def_readonly("areas", &SurfaceReference::areas)
       .def_readonly("cotan", &SurfaceReference::cotan);
   py::class_<SurfaceQuality>(m, "SurfaceQuality")
@@ -108,11 +110,9 @@ void bind_glide(py::module_& m) {
                                       signal_poll());
           },
           py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("facing"),
-          py::arg("face_sd"),
-          py::arg("face_error"), release_gil())
+          py::arg("face_sd"), py::arg("face_error"), release_gil())
       .def("figures", &SurfaceNewton::figures, release_gil())
-      .def("least_facing", [](const SurfaceNewton& self) { return least_facing(self.problem(), self.angles()); }, release_gil())
-      .def("folds", [](const SurfaceNewton& self) { return certificate::torus_graph(glide_image(self.problem(), self.angles()), self.problem().chart.faces, std::sqrt(self.problem().ratio) / 6.283185307179586).bad; }, release_gil())
+      .def("least_facing", &SurfaceNewton::facing, release_gil())
       .def_property_readonly("angles", &SurfaceNewton::angles);
 }
 

@@ -1,10 +1,20 @@
 #include "stretchmap/area/chart.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include "stretchmap/area/line_roots.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap::area {
+
+namespace {
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+}  // namespace
 
 SurfaceChart surface_chart(const mesh::SurfaceTopology& top, const IndexRows& forms) {
   if (forms.rows() != 2 || forms.cols() != top.edges.rows())
@@ -35,9 +45,26 @@ Vec turn_areas(const SurfaceChart& chart, const Points2Ref& turns) {
     const Eigen::Vector2d p = chart.corner(turns, f, 0);
     const Eigen::Vector2d a = chart.corner(turns, f, 1) - p;
     const Eigen::Vector2d b = chart.corner(turns, f, 2) - p;
-    areas(f) = 0.5 * (a.x() * b.y() - a.y() * b.x());
+    areas(f) = 0.5 * cross(a, b);
   }
   return areas;
+}
+
+double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,
+                     const Points2Ref& direction, double share, double longest) {
+  for (Index f = 0; f < chart.faces.rows(); ++f) {
+    const Eigen::Vector2d p = chart.corner(turns, f, 0);
+    const Eigen::Vector2d a = chart.corner(turns, f, 1) - p, b = chart.corner(turns, f, 2) - p;
+    const auto way = [&](int k) -> Eigen::Vector2d {
+      return (direction.row(chart.faces(f, k)) - direction.row(chart.faces(f, 0))).transpose();
+    };
+    const Eigen::Vector2d da = way(1), db = way(2);
+    const double now = cross(a, b);
+    if (!(now > 0.0)) continue;
+    const double linear = cross(da, b) + cross(a, db), quadratic = cross(da, db);
+    longest = std::min(longest, share * first_root(now, linear, quadratic));
+  }
+  return longest;
 }
 
 Vec equal_area_from_angle(const VecRef& v, double tube_ratio) {

@@ -5,8 +5,9 @@
 #include <limits>
 #include <vector>
 
-#include "stretchmap/area/line_roots.hpp"
+#include "area/torus_point.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/certificate/torus_graph.hpp"
 
 namespace stretchmap::area {
 
@@ -86,17 +87,7 @@ void SurfaceNewton::factorise(const Rows& hessians, const Poll& poll) {
 
 // At most 1, and at most nine tenths of the way to the first face of no area in the (u, v) chart.
 double SurfaceNewton::longest_step(const Points2& direction) const {
-  const Points2 turns = angles_ / kTwoPi, change = direction / kTwoPi;
-  SurfaceChart loops = problem_.chart;
-  loops.shift_u.setZero();
-  loops.shift_v.setZero();
-  const Vec now = turn_areas(problem_.chart, turns);
-  const Vec quadratic = turn_areas(loops, change);
-  const Vec linear = turn_areas(problem_.chart, turns + change) - now - quadratic;
-  double longest = 1.0;
-  for (Index f = 0; f < now.size(); ++f)
-    longest = std::min(longest, 0.9 * first_root(now(f), linear(f), quadratic(f)));
-  return longest;
+  return unfolded_step(problem_.chart, angles_ / kTwoPi, direction / kTwoPi, 0.9, 1.0);
 }
 
 bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd, double face_error,
@@ -123,7 +114,7 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd,
   } catch (const Error&) {  // singular: nothing to be had
     now.ring_sd = std::numeric_limits<double>::infinity();
   }
-  if (now.flips == 0 && now.ring_sd <= kRingGoal &&
+  if (now.flips <= before.flips && now.ring_sd <= kRingGoal &&
       now.face_sd <= std::max(before.face_sd, face_sd) &&
       now.face_error <= std::max(before.face_error, face_error))
     return true;
@@ -138,10 +129,11 @@ SurfaceFigures SurfaceNewton::figures() const {
   SurfaceFigures figures;
   const Vec& source = problem_.reference.areas;
   figures.energy = (areas.array().square() / source.array()).sum();
-  figures.flips = static_cast<Index>(flipped(problem_, angles_).size());
-  figures.angle_mean =
-      surface_quality(problem_.reference, problem_.chart.faces, glide_image(problem_, angles_))
-          .angle_mean;
+  const Points image = glide_image(problem_, angles_);
+  const double axis = problem_.ratio * tube_radius(problem_.ratio);
+  figures.flips =
+      static_cast<Index>(certificate::torus_graph(image, problem_.chart.faces, axis).bad.size());
+  figures.angle_mean = surface_quality(problem_.reference, problem_.chart.faces, image).angle_mean;
   ratio_figures(problem_.chart.faces, problem_.chart.n_vertices, source, areas, figures);
   return figures;
 }

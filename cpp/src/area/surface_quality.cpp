@@ -1,5 +1,6 @@
 #include "stretchmap/area/surface_quality.hpp"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,17 +15,43 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586476925287;
 }
 
-SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces) {
+namespace {
+
+using Eigen::Matrix2d;
+
+// The triangle with edges `edges` from its first corner, made rounder where it is too long.
+Matrix2d rounded(const Matrix2d& edges, double max_aspect) {
+  Matrix2d regular;
+  regular << 1.0, 0.5, 0.0, 0.8660254037844386;
+  const Matrix2d map = edges * regular.inverse();
+  // |map|^2 / (2 det) = (a + 1/a) / 2 for the ratio a of the singular values.
+  if (map.squaredNorm() <= map.determinant() * (max_aspect + 1.0 / max_aspect)) return edges;
+  const Eigen::JacobiSVD<Matrix2d> svd(map, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double size = std::sqrt(map.determinant() * max_aspect);
+  const Eigen::Vector2d sigma(size, size / max_aspect);
+  return svd.matrixU() * sigma.asDiagonal() * svd.matrixV().transpose() * regular;
+}
+
+}  // namespace
+
+SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces,
+                                   double max_aspect) {
   SurfaceReference reference{Vec(faces.rows()), Points(faces.rows(), 3)};
   std::vector<Index> flat;
   for (Index f = 0; f < faces.rows(); ++f) {
-    Eigen::Vector3d p[3];
-    for (int k = 0; k < 3; ++k) p[k] = points.row(faces(f, k));
-    const double area = 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
-    if (!(area > 0.0)) flat.push_back(f);
-    reference.areas(f) = area;
-    for (int k = 0; k < 3; ++k)
-      reference.cotan(f, k) = (p[(k + 1) % 3] - p[k]).dot(p[(k + 2) % 3] - p[k]) / (2.0 * area);
+    const Eigen::Vector3d a = points.row(faces(f, 1)) - points.row(faces(f, 0));
+    const Eigen::Vector3d b = points.row(faces(f, 2)) - points.row(faces(f, 0));
+    const double base = a.norm(), twice = a.cross(b).norm();
+    reference.areas(f) = 0.5 * twice;
+    if (!(twice > 0.0)) {
+      flat.push_back(f);
+      continue;
+    }
+    Matrix2d edges;
+    edges << base, a.dot(b) / base, 0.0, twice / base;
+    edges = rounded(edges, max_aspect);
+    const Eigen::Vector2d p = edges.col(0), q = edges.col(1);
+    reference.cotan.row(f) << p.dot(q) / twice, p.dot(p - q) / twice, q.dot(q - p) / twice;
   }
   if (!flat.empty()) throw Error("DegenerateError", "faces of the source have no area", flat);
   reference.areas /= reference.areas.sum();

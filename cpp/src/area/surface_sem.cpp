@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "stretchmap/area/line_roots.hpp"
 #include "stretchmap/area/surface_stretch.hpp"
 
 namespace stretchmap::area {
@@ -68,7 +67,6 @@ double SurfaceSem::line_search(const Points2& direction) const {
   loops.shift_v.setZero();
   const Vec quadratic = turn_areas(loops, direction);
   const Vec linear = turn_areas(chart_, turns_ + direction) - now - quadratic;
-  double longest = 2.0;
   double c[5] = {};
   for (Index f = 0; f < now.size(); ++f) {
     const double w = 1.0 / areas_(f);
@@ -76,10 +74,9 @@ double SurfaceSem::line_search(const Points2& direction) const {
     c[2] += w * (linear(f) * linear(f) + 2.0 * now(f) * quadratic(f));
     c[3] += 2.0 * w * linear(f) * quadratic(f);
     c[4] += w * quadratic(f) * quadratic(f);
-    if (now(f) > 0.0)
-      longest = std::min(longest, 0.95 * first_root(now(f), linear(f), quadratic(f)));
   }
-  return c[1] < 0.0 ? minimise_quartic(c, longest) : 0.0;
+  return c[1] < 0.0 ? minimise_quartic(c, unfolded_step(chart_, turns_, direction, 0.95, 2.0))
+                    : 0.0;
 }
 
 SurfaceFigures SurfaceSem::figures() const {

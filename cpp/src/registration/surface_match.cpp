@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "stretchmap/registration/triangle_energy.hpp"
+#include "stretchmap/area/triangle_energy.hpp"
 
 namespace stretchmap::registration {
 namespace {
@@ -42,8 +42,8 @@ template <typename SlopeOfCorner>
 FaceModel face_model(const Eigen::Matrix2d& P, const Eigen::Matrix2d& R,
                      const SlopeOfCorner& slope) {
   Eigen::Matrix2d stress;
-  Matrix4 curvature;
-  triangle_energy(P * R, stress, curvature);
+  area::Matrix4 curvature;
+  area::triangle_energy(P * R, stress, curvature);
   Eigen::Matrix<double, 3, 2> G;
   G << 0.0, 0.0, R(0, 0), R(0, 1), R(1, 0), R(1, 1);
   G.row(0) = -(G.row(1) + G.row(2));
@@ -84,7 +84,7 @@ double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const P
   for (Index f = 0; f < chart.faces.rows(); ++f) {
     if (!(chart_edges(chart, y, f).determinant() > 0.0))
       return std::numeric_limits<double>::infinity();
-    total += weights[f] * triangle_energy(plane_edges(chart, X, f) * rest_of(rest, f));
+    total += weights[f] * area::triangle_energy(plane_edges(chart, X, f) * rest_of(rest, f));
   }
   return total;
 }
@@ -115,7 +115,8 @@ double flat_value(const area::SurfaceChart& chart, const Points2Ref& y,
                   const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights) {
   double total = 0.0;
   for (Index f = 0; f < chart.faces.rows(); ++f)
-    total += weights[f] * triangle_energy(lattice * chart_edges(chart, y, f) * rest_of(rest, f));
+    total +=
+        weights[f] * area::triangle_energy(lattice * chart_edges(chart, y, f) * rest_of(rest, f));
   return total;
 }
 

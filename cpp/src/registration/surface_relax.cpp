@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "stretchmap/registration/triangle_energy.hpp"
+#include "stretchmap/area/triangle_energy.hpp"
 
 namespace stretchmap::registration {
 namespace {
@@ -38,7 +38,7 @@ double face_value(const area::SurfaceChart& chart, const Points2& y, const Point
   Eigen::Matrix2d edges, rest_edges;
   edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
   rest_edges << rest(f, 0), rest(f, 1), rest(f, 2), rest(f, 3);
-  return triangle_energy(edges * rest_edges);
+  return area::triangle_energy(edges * rest_edges);
 }
 
 class Search {

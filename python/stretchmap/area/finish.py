@@ -1,28 +1,53 @@
-"""x"""
+"""The polyhedral image: folds undone, then areas by Newton steps, then rings made exact."""
 
 from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from .. import _core
 from ..base.progress import Progress, report
 from ..maps.history import IterationRecord
 
-if TYPE_CHECKING:
-    pass
-
 # Weights of the finishing energy against which the area term grows.
 _SHAPE = 0.1
 _CHART = 1.0
-_GROWTH = 4.0
+_FACING = 1.0
+_GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
 _STALLED = 3  # steps in a row without any length end the iteration
+_REST, _SLOW = 8, 0.01  # so many steps that lower the energy by less than this share end it, too
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
 _MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings need some room
-_FAIR = 4.0  # from this face SD on, in units of tol, the shape budget counts
+_FAIR = 2.0  # from this face SD on, in units of tol, the shape budget counts
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
+
+_UNFOLD_STEPS = 100
+_EPSILON = 0.2  # of the worst face
+_LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
+
+
+def unfold_faces(
+    newton: _core.area.SurfaceNewton, progress: Progress | None
+) -> list[IterationRecord]:
+    """Newton steps on the regularized energy until every face looks outward, or no step is left.
+
+    Faces too coarse for their place turn inward when the flat chart is wrapped round the torus.
+    """
+    start = time.perf_counter()
+    history: list[IterationRecord] = []
+    for iteration in range(_UNFOLD_STEPS):
+        facing = newton.least_facing()
+        if facing > 0.0:
+            break
+        epsilon = min(max(-_EPSILON * facing, _LEAST_EPSILON), _MOST_EPSILON)
+        taken = newton.step(1.0, _SHAPE, _CHART, _FACING, epsilon)
+        history.append(_record("untangle", iteration + 1, taken, newton.figures(), start))
+        report(progress, "area", iteration, _UNFOLD_STEPS, flips=history[-1].flips)
+        if taken.step == 0.0:
+            break
+    return history
 
 
 def finish_areas(
@@ -33,42 +58,62 @@ def finish_areas(
     shape_budget: float,
     progress: Progress | None,
 ) -> tuple[list[IterationRecord], bool, str]:
-    """Newton steps on the polyhedral areas: records, converged, reason."""
+    """Newton steps on the polyhedral areas: records, converged, reason.
+
+    Faces that look outward stay so; if some do not, that barrier is left out.
+    """
     start = time.perf_counter()
     history: list[IterationRecord] = []
-    weight, stalled, least = 1.0, 0, math.inf
+    weight, least = 1.0, math.inf
+    barrier = _FACING if newton.least_facing() > 0.0 else 0.0
     taken = None
+    at_rest = _rest()
     reason = "most steps done"
     for iteration in range(max_iter + 1):
         if iteration:
-            taken = newton.step(1.0, _SHAPE / weight, _CHART / weight)
-            stalled = 0 if taken.step > 0.0 else stalled + 1
-            weight *= _GROWTH if taken.step >= _FULL_STEP else 1.0
+            taken = newton.step(1.0, _SHAPE / weight, _CHART / weight, barrier / weight, 0.0)
+            if taken.step >= _FULL_STEP:
+                weight = min(weight * _GROWTH, _MOST_WEIGHT)
         figures = newton.figures()
         least = min(least, figures.angle_mean)
-        history.append(_record(iteration, taken, figures, start))
+        history.append(_record("newton", iteration, taken, figures, start))
         report(progress, "area", iteration, max_iter, face_sd=figures.face_sd)
         if figures.face_sd <= _MARGIN * tol and _within(figures, tol):
             break
-        if stalled == _STALLED:
-            reason = "no step lowers the energy"
+        if taken is not None and at_rest(taken):
+            reason = "no step lowers the energy" if taken.step == 0.0 else "energy at rest"
             break
         if figures.face_sd <= _FAIR * tol and figures.angle_mean > shape_budget * least:
             reason = "shape budget spent"
             break
     weight = min(weight, _RING_WEIGHT)
     if rings and newton.project_rings(
-        1.0, _SHAPE / weight, _CHART / weight, tol, _RATIO_GOAL * tol
+        1.0, _SHAPE / weight, _CHART / weight, barrier / weight, tol, _RATIO_GOAL * tol
     ):
-        history.append(_record(len(history), None, newton.figures(), start))
+        history.append(_record("newton", len(history), None, newton.figures(), start))
     figures = newton.figures()
-    if _within(figures, tol):
+    if figures.flips == 0 and _within(figures, tol):
         return history, True, "areas within tol"
+    folds = f", {figures.flips} faces do not look outward" if figures.flips else ""
     return (
         history,
         False,
-        (f"{reason}, face SD {figures.face_sd:.2e}, worst {figures.face_error:.2e}, tol {tol:.2e}"),
+        f"{reason}{folds}, face SD {figures.face_sd:.2e}, worst {figures.face_error:.2e}, "
+        f"tol {tol:.2e}",
     )
+
+
+def _rest() -> Callable[[_core.area.GlideStep], bool]:
+    """Whether the last steps, told one by one, were all too short or too small to go on."""
+    stalled = slow = 0
+
+    def at_rest(taken: _core.area.GlideStep) -> bool:
+        nonlocal stalled, slow
+        stalled = stalled + 1 if taken.step == 0.0 else 0
+        slow = slow + 1 if taken.before - taken.after < _SLOW * abs(taken.before) else 0
+        return stalled == _STALLED or slow == _REST
+
+    return at_rest
 
 
 def _within(figures: _core.area.SurfaceFigures, tol: float) -> bool:
@@ -76,13 +121,14 @@ def _within(figures: _core.area.SurfaceFigures, tol: float) -> bool:
 
 
 def _record(
+    stage: str,
     iteration: int,
     taken: _core.area.GlideStep | None,
     figures: _core.area.SurfaceFigures,
     start: float,
 ) -> IterationRecord:
     return IterationRecord(
-        stage="newton",
+        stage=stage,
         iteration=iteration,
         energy=math.nan if taken is None else taken.after,
         step=math.nan if taken is None else taken.step,

@@ -16,13 +16,15 @@ from ..base.arrays import read_only
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import Torus
+from ..certificate.checks import certify
+from ..certificate.findings import Certificate
 from ..conformal.map import ConformalMap, conformal_map
-from ..errors import OptionError
-from ..maps.history import IterationRecord
+from ..errors import CertificationError, OptionError
 from ..maps.result import MapResult
-from .finish import finish_areas
+from .balance import JAMMED, balance_areas
+from .finish import finish_areas, unfold_faces
 from .search import Ratio, search_phase
-from .sem import minimize_stretch, start_angles
+from .sem import minimize_stretch, start_angles, unfolded_turns
 
 if TYPE_CHECKING:
     from ..homology.basis import HomologyBasis
@@ -33,6 +35,9 @@ __all__ = ["AreaMap", "Finish", "area_map"]
 Finish = Literal["ring", "face", "none"]
 
 _log = logging.getLogger("stretchmap")
+
+# Source triangles longer than this are not asked to keep their shape.
+_MAX_ASPECT = 10.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -58,10 +63,15 @@ class AreaMap(MapResult):
         Integer closed 1-forms of u and v, as in `ConformalMap`.
     history : tuple of IterationRecord
         One record per iteration: stage ``"sem"`` measured in the equal-area chart, its energy E_S
-        (4.1) of shares, at least 1; stage ``"newton"`` on the polyhedral image, its energy that of
-        the finishing solve over the weight of its area term. Within a stage the energy never rises.
+        (4.1) of shares, at least 1; stage ``"balance"``, Newton steps in that chart where the
+        first jams; stages ``"untangle"`` and ``"newton"`` on the polyhedral image, the energy of
+        the latter that of the finishing solve over the weight of its area term: within ``"sem"``
+        and ``"newton"`` it never rises. There ``flips`` are the faces that do not look outward
+        along the whole face, what the certificate checks.
+    certificate : Certificate
+        Whether the map is proven to be one to one, computed independently of how it was found.
     distortion : Distortion
-        Of the polyhedral image; a face is flipped where it is negative in the (u, v) chart.
+        Of the polyhedral image; a face is flipped where it looks into the torus.
     converged : bool
     stop_reason : str
     seconds : dict
@@ -76,14 +86,20 @@ class AreaMap(MapResult):
     phase: float
     ratio: float
     forms: NDArray[np.int32] = field(repr=False)
+    certificate: Certificate = field(repr=False)
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """``angles`` (n, 2) and ``forms`` (2, e)."""
         return {"angles": self.angles, "forms": self.forms}
 
     def extra_scalars(self) -> dict[str, Any]:
-        """``phase`` and ``ratio``."""
-        return {"phase": self.phase, "ratio": self.ratio}
+        """``phase`` and ``ratio``, and what the certificate says."""
+        return {
+            "phase": self.phase,
+            "ratio": self.ratio,
+            "certified": self.certificate.certified,
+            "certificate": self.certificate.to_dict(),
+        }
 
     def image_on(self, torus: Torus) -> NDArray[np.float64]:
         """The same map on a torus of another size, (n, 3).
@@ -108,10 +124,11 @@ def area_map(
     phase: float | None = None,
     ratio: Ratio | float = "conformal",
     finish: Finish = "ring",
-    max_iter: int = 30,
+    max_iter: int = 100,
     tol: float = 5e-3,
     shape_budget: float = 1.2,
     sem_iter: int = 10,
+    keep_best: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> AreaMap:
@@ -139,7 +156,8 @@ def area_map(
     finish : "ring", "face" or "none"
         ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then a
         projection that makes the area of every vertex ring exact, kept if the faces stay within
-        ``tol`` or do not get worse. ``"none"``: the chart's map as it is.
+        ``tol`` or do not get worse. ``"none"``: the chart's map as it is, a start for
+        others, returned whether it is certified or not.
     max_iter : int
         Most Newton steps.
     tol : float
@@ -151,6 +169,8 @@ def area_map(
         is paid for with needles.
     sem_iter : int
         Most steps of stretch energy minimisation.
+    keep_best : bool
+        Return the map even if it is not certified.
     threads : int, optional
         Threads to use, see `threads`; the result does not depend on it.
     progress : Progress, optional
@@ -165,6 +185,8 @@ def area_map(
     ------
     OptionError
         An option out of range.
+    CertificationError
+        Faces of the polyhedral image stay folded, or the surface crosses itself; ``ids`` are faces.
     SolverError
         No start without flipped faces was found; ``ids`` are the faces.
     GenusError, MeshError
@@ -186,7 +208,13 @@ def area_map(
     clock = _lap(seconds, "conformal", clock)
 
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
+    reference = _core.area.SurfaceReference(surface.V, surface.F, _MAX_ASPECT)
     turns, history = minimize_stretch(surface, chart, conformal, sem_iter, progress)
+    if sem_iter and history[-1].energy > 1.0 + JAMMED:
+        turns, records = balance_areas(
+            chart, reference, conformal.aspect, unfolded_turns(surface, chart, conformal), progress
+        )
+        history += records
     clock = _lap(seconds, "sem", clock)
 
     wanted = ratio if torus is None else torus.ratio
@@ -194,25 +222,30 @@ def area_map(
     angles = start_angles(chart, turns, phase, ratio)
     clock = _lap(seconds, "phase", clock)
 
-    records: list[IterationRecord] = []
     converged, reason = True, "stretch energy at rest"
     if finish != "none":
-        problem = _core.area.GlideProblem(
-            chart, _core.area.SurfaceReference(surface.V, surface.F), ratio
-        )
-        newton = _core.area.SurfaceNewton(problem, angles)
+        newton = _core.area.SurfaceNewton(_core.area.GlideProblem(chart, reference, ratio), angles)
+        history += unfold_faces(newton, progress)
         records, converged, reason = finish_areas(
             newton, finish == "ring", max_iter, tol, shape_budget, progress
         )
+        history += records
         angles = newton.angles
-    history += records
-    _lap(seconds, "finish", clock)
+    clock = _lap(seconds, "finish", clock)
 
     if torus is None:
         torus = Torus.from_ratio(ratio, area=surface.area)
     image = torus.xi(angles[:, 0], angles[:, 1])
     if not converged:
         _log.warning("area map: %s", reason)
+    certificate = certify(surface, image, torus)
+    _lap(seconds, "certificate", clock)
+    if finish != "none" and not (certificate.certified or keep_best):
+        raise CertificationError(
+            f"the area map is not certified: {certificate.reason}; keep_best=True returns it all "
+            "the same",
+            next(iter(certificate.ids.values()), ()),
+        )
     return AreaMap(
         mesh=surface,
         angles=read_only(angles),
@@ -221,6 +254,7 @@ def area_map(
         phase=phase,
         ratio=ratio,
         forms=conformal.forms,
+        certificate=certificate,
         history=tuple(history),
         converged=converged,
         stop_reason=reason,

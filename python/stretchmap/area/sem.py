@@ -28,12 +28,7 @@ def minimize_stretch(
 ) -> tuple[NDArray[np.float64], list[IterationRecord]]:
     """Steps of (4.5) in the chart until the energy is at its bound or stops falling."""
     start = time.perf_counter()
-    turns = conformal.turns
-    if (_core.area.turn_areas(chart, turns) <= 0.0).any():
-        # Positive weights embed the surface in a flat torus whatever its triangles (Tutte).
-        weights = np.ones(len(surface.edges))
-        forms = conformal.forms.astype(float)
-        turns = _core.forms.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
+    turns = unfolded_turns(surface, chart, conformal)
     sem = _core.area.SurfaceSem(chart, surface.face_areas, conformal.aspect, turns)
     history: list[IterationRecord] = []
     taken = None
@@ -58,6 +53,18 @@ def minimize_stretch(
         if iteration and history[-2].energy - figures.energy <= 1e-4 * figures.energy:
             break
     return sem.turns, history
+
+
+def unfolded_turns(
+    surface: TriMesh, chart: _core.area.SurfaceChart, conformal: ConformalMap
+) -> NDArray[np.float64]:
+    """The conformal map's turns or, if it has folds, those of a map that has none."""
+    if (_core.area.turn_areas(chart, conformal.turns) > 0.0).all():
+        return conformal.turns
+    # Positive weights embed the surface in a flat torus whatever its triangles (Tutte).
+    weights = np.ones(len(surface.edges))
+    forms = conformal.forms.astype(float)
+    return _core.forms.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
 
 
 def start_angles(

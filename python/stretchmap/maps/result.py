@@ -146,10 +146,10 @@ class MapResult(HasSummary):
     def distortion(self) -> Distortion:
         """Measures of the map, see :func:`distortion`.
 
-        The image of a surface is oriented by ``angles``, else by ``torus``.
+        The image of a surface is oriented by ``torus``, else by ``angles``.
         """
-        torus = self.torus if self.angles is None else None
-        return distortion(self.mesh, self.image, torus=torus, angles=self.angles)
+        angles = self.angles if self.torus is None else None
+        return distortion(self.mesh, self.image, torus=self.torus, angles=angles)
 
     @cached_property
     def point_map(self) -> PointMap:

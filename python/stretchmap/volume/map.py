@@ -229,8 +229,9 @@ def volume_map(
         if not certified:
             finish, area_tol = "ring", 5e-3
         boundary_map = area_map(
-            solid.surface, ratio=ratio, phase=phase, finish=finish, tol=area_tol, progress=progress
-        )
+            solid.surface, ratio=ratio, phase=phase, finish=finish, tol=area_tol, keep_best=True,
+            progress=progress,
+        )  # fmt: skip
         seconds["boundary"] = time.perf_counter() - clock
 
     refinement = None

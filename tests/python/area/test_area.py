@@ -189,21 +189,89 @@ def test_finishing_derivatives_by_differences(
     )
 
 
-def test_facing_gradient_by_differences(bumpy: TriMesh, chart: _core.area.SurfaceChart) -> None:
-    result = area_map(bumpy, finish="none", sem_iter=2)
-    reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
-    problem = _core.area.GlideProblem(chart, reference, result.ratio, facing=True)
-    plain = _core.area.GlideProblem(chart, reference, result.ratio)
-    angles = np.array(result.angles)
-    direction = np.random.default_rng(5).normal(size=angles.shape)
+@pytest.mark.parametrize("sides", [(9, 5, 1.2), (12, 8, 2.0)])
+def test_facing_derivatives_by_differences(sides: tuple[int, int, float]) -> None:
+    nu, nv, ratio = sides
+    mesh = stretchmap.samples.torus_surface(nu, nv, ratio, 1.0)
+    conformal = conformal_map(mesh)
+    chart = _core.area.SurfaceChart(mesh.topology, conformal.forms)
+    problem = _core.area.GlideProblem(chart, _core.area.SurfaceReference(mesh.V, mesh.F), ratio)
+    rng = np.random.default_rng(5)
+    angles = conformal.angles + 0.05 * rng.normal(size=conformal.angles.shape)
+    direction = rng.normal(size=angles.shape)
     h = 1e-6
 
-    def at(t: float) -> tuple[float, np.ndarray, object]:
-        return _core.testing.glide_energy(problem, 0.0, 0.0, 1.0, 1.0, angles + t * direction)
+    def at(t: float, epsilon: float) -> tuple[float, np.ndarray, object]:
+        moved = angles + t * direction
+        return _core.testing.glide_energy(
+            problem, 0.0, 0.0, 0.0, 1.0, moved, facing=1.0, epsilon=epsilon
+        )
 
-    slope = (at(h)[0] - at(-h)[0]) / (2 * h)
-    assert at(0.0)[1] @ direction.ravel() == pytest.approx(slope, rel=1e-6)
-    assert at(0.0)[0] > _core.testing.glide_energy(plain, 0.0, 0.0, 1.0, 1.0, angles)[0]
+    for epsilon in (0.3, 0.0):
+        slope = (at(h, epsilon)[0] - at(-h, epsilon)[0]) / (2 * h)
+        assert at(0.0, epsilon)[1] @ direction.ravel() == pytest.approx(slope, rel=1e-6)
+    change = (at(h, 0.0)[1] - at(-h, 0.0)[1]) / (2 * h)
+    exact = at(0.0, 0.0)[2] @ direction.ravel()
+    np.testing.assert_allclose(exact, change, atol=1e-7 * np.abs(exact).max())
+
+
+STAGES = ("sem", "balance", "untangle", "newton")
+
+
+def pinched(seed: int) -> TriMesh:
+    """A torus turned inside out about a point close to it: a big body with a small hole."""
+    rng = np.random.default_rng(seed)
+    mesh = stretchmap.samples.torus_surface(40, 28, 2.0, 1.0)
+    away = mesh.V - [3.6, *rng.uniform(-0.2, 0.2, size=2)]
+    return TriMesh(away / (away**2).sum(axis=1)[:, None], mesh.F, orient=True)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_small_handles_are_balanced_and_certified(seed: int) -> None:
+    mesh = pinched(seed)
+    chart_areas = conformal_map(mesh).chart_areas * mesh.area / mesh.face_areas
+    assert chart_areas.max() > 1e3 * chart_areas.min()
+    result = area_map(mesh, finish="face", max_iter=15)
+    stages = {stage: [r for r in result.history if r.stage == stage] for stage in STAGES}
+    assert stages["sem"][-1].energy > 1.01
+    assert stages["balance"][-1].element_std < stages["sem"][0].element_std / 5.0
+    assert result.certificate.certified
+    assert result.distortion.flips == 0
+    assert result.distortion.element_std <= 0.3
+
+
+def test_balancing_starts_only_from_charts_without_folds(bumpy: TriMesh) -> None:
+    conformal = conformal_map(bumpy)
+    chart = _core.area.SurfaceChart(bumpy.topology, conformal.forms)
+    reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
+    with pytest.raises(SolverError, match="folded") as caught:
+        _core.area.ChartNewton(chart, reference, conformal.aspect, conformal.turns[:, ::-1].copy())
+    assert len(caught.value.ids) > 0
+    newton = _core.area.ChartNewton(chart, reference, conformal.aspect, conformal.turns)
+    taken = newton.step(1.0, 0.1, 4.0)
+    assert taken.step > 0.0 and taken.after < taken.before
+
+
+def test_long_triangles_are_rounded_for_the_shape_terms() -> None:
+    V = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1e-3, 0.0]])
+    F = np.array([[0, 1, 2]], dtype=np.int32)
+    true, round_ = (_core.area.SurfaceReference(V, F, *limit) for limit in ((), (4.0,)))
+    np.testing.assert_allclose(true.cotan[0], [500.0, 500.0, -249.999], rtol=1e-3)
+    # Edges over the area: the sum of squares is that of a triangle of aspect 4.
+    assert round_.cotan.sum() == pytest.approx(np.sqrt(3.0) * (4.0 + 0.25) / 2.0, rel=1e-9)
+
+
+def test_folds_are_refused_or_kept_on_request(bumpy: TriMesh) -> None:
+    coarse = stretchmap.samples.torus_surface(3, 3, 1.05, 1.0)
+    try:
+        kept = area_map(coarse)
+    except stretchmap.errors.CertificationError as error:
+        assert error.ids
+        kept = area_map(coarse, keep_best=True)
+        assert not kept.certificate.certified
+    else:
+        assert kept.certificate.certified
+    assert kept.to_dict()["certified"] == kept.certificate.certified
 
 
 def test_model_is_convex_and_bounded_by_nothing_but_convexity(

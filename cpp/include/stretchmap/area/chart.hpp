@@ -28,6 +28,11 @@ SurfaceChart surface_chart(const mesh::SurfaceTopology& top, const IndexRows& fo
 // (m) signed areas of the faces in the chart; they sum to one for a map of degree one.
 Vec turn_areas(const SurfaceChart& chart, const Points2Ref& turns);
 
+// How far along `direction` (n, 2) no face with positive area loses it: `share` of the way to the
+// first one, at most `longest`.
+double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,
+                     const Points2Ref& direction, double share, double longest);
+
 // The equal-area coordinate of a ring torus, dA = R r du ds: s = v + (r / R) sin v, in radians.
 // \pre tube_ratio = r / R in [0, 1).
 Vec equal_area_from_angle(const VecRef& v, double tube_ratio);

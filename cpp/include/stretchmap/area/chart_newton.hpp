@@ -1,49 +1,65 @@
-// Projected Newton steps towards areas in the flat chart, in stages a Newton step can follow.
+// Newton steps towards equal area ratios in the flat chart, for maps so far from it that the fixed
+// point (4.5) jams at the first face about to fold. Minimized in a step is
 //
-//   sum |t| [ area (D + 1/D - 2) + shape (|K|^2 / (2 D) - 1) ],   D = det K,
+//   sum w_f [ area (D + 1/D - 2) + shape (|K|^2 / (2 D) - 1) ],   D = det K,
 //
-// K the Jacobian from the source triangle, enlarged to the area a tau of its image that is wanted
-// next: the source's own share a, but not more than a factor `reach` away from the image's. Areas
-// of source and chart are scaled to one.
+// with K the Jacobian from the source triangle enlarged to the area its image is to have next: the
+// source's own share of the total, but no more than a factor `reach` away from the image's. So no
+// face is asked for more than a Newton step can do, and the areas of far too small faces grow by
+// that factor in every step. w_f is the mean of the shares of source and image: with the source's
+// alone the few faces that hold most of the chart at first cost nothing and are crushed.
 #pragma once
 
 #include <optional>
 
+#include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/surface_pattern.hpp"
 #include "stretchmap/area/surface_quality.hpp"
 #include "stretchmap/area/surface_sem.hpp"
+#include "stretchmap/area/triangle_energy.hpp"
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/linalg/block_ldlt.hpp"
 
 namespace stretchmap::area {
 
 struct ChartStep {
-  double before = 0.0, after = 0.0;
-  double step = 0.0;
-  double decrement = 0.0;
-  double reached = 0.0;  // share of the source's area whose target is its own share
+  double before = 0.0;     // energy with this step's targets, before
+  double after = 0.0;      // and after the step
+  double step = 0.0;       // fraction of the Newton step taken, 0: none decreases the energy
+  double decrement = 0.0;  // Newton decrement g' H^-1 g
+  double within = 0.0;     // share of the source's area whose target was its own share
 };
 
 class ChartNewton {
  public:
+  // reference: as surface_reference gives it; aspect: length of the torus along u over that along
+  // v; turns (n, 2) without folded faces.
+  // \throws Error "SolverError" if a face is folded (ids: faces).
   ChartNewton(SurfaceChart chart, SurfaceReference reference, double aspect, Points2 turns);
-  ChartStep step(double area, double shape, double reach, int mix, const Poll& poll = {});
+
+  // \pre reach > 1.
+  ChartStep step(const TriangleWeights& weights, double reach, const Poll& poll = {});
+
   SurfaceFigures figures() const;
   const Points2& turns() const { return turns_; }
 
  private:
-  double energy(const Points2& turns, const Vec& tau, double area, double shape) const;
-  double longest_step(const Points2& direction) const;
-  Eigen::Matrix2d jacobian(const Points2& turns, Index f, double tau) const;
+  struct Targets {
+    Vec areas;    // (m) of the enlarged source triangles, over their own
+    Vec weights;  // (m)
+  };
+  Targets targets(double reach) const;
+  Eigen::Matrix2d rest(const Targets& targets, Index f) const;
+  Eigen::Matrix2d jacobian(const Points2& turns, const Targets& targets, Index f) const;
+  double energy(const Points2& turns, const TriangleWeights& weights, const Targets& targets) const;
 
   SurfaceChart chart_;
   SurfaceReference reference_;
   Eigen::Vector2d periods_;
   Points2 turns_;
-  Rows rest_;
-  Vec weights_;
+  Rows rest_;  // (m, 4) inverse edge matrices of the source triangles, row-major
   SurfacePattern pattern_;
-  std::optional<linalg::BlockLdlt<2>> solver_;
+  std::optional<linalg::BlockLdlt<2>> solver_;  // from the first step on
 };
 
 }  // namespace stretchmap::area

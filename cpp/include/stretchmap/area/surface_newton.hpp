@@ -36,8 +36,12 @@ class SurfaceNewton {
   bool project_rings(const SurfaceWeights& weights, double face_sd, double face_error,
                      const Poll& poll = {});
 
-  // Of the polyhedral image.
+  // Of the polyhedral image; flips are the faces that break the certificate's condition.
   SurfaceFigures figures() const;
+
+  // As least_facing.
+  double facing() const { return least_facing(problem_, angles_); }
+
   const Points2& angles() const { return angles_; }
   const GlideProblem& problem() const { return problem_; }
 

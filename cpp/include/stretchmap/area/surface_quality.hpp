@@ -12,8 +12,12 @@ struct SurfaceReference {
   Points cotan;  // (m, 3) cotangent of the angle at each corner
 };
 
+// Triangles with a larger ratio of singular values than `max_aspect`, relative to an equilateral
+// one, are given that ratio, their area and axes kept: a needle whose shape is asked to be kept
+// forbids its neighbours to change theirs. \pre max_aspect >= 1.
 // \throws Error "DegenerateError" for faces without area (ids: faces).
-SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces);
+SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces,
+                                   double max_aspect);
 
 struct SurfaceQuality {
   double energy = 0.0;      // mean of (s1^2 + s2^2 + s1^-2 + s2^-2) / 4 over the source's area, s

@@ -1,24 +1,26 @@
-#include "stretchmap/registration/triangle_energy.hpp"
+#include "stretchmap/area/triangle_energy.hpp"
 
 #include <cmath>
 #include <limits>
 
-namespace stretchmap::registration {
+namespace stretchmap::area {
 
-double triangle_energy(const Eigen::Matrix2d& K) {
+double triangle_energy(const Eigen::Matrix2d& K, const TriangleWeights& weights) {
   const double D = K.determinant();
   if (!(D > 0.0)) return std::numeric_limits<double>::infinity();
-  return 0.5 * (K.squaredNorm() / D + D + 1.0 / D) - 2.0;
+  return weights.shape * (0.5 * K.squaredNorm() / D - 1.0) +
+         weights.area * ((D - 1.0) * (D - 1.0) / D);
 }
 
-double triangle_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H) {
+double triangle_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H,
+                       const TriangleWeights& weights) {
   using Eigen::Matrix2d;
   using Eigen::Vector2d;
   const double D = K.determinant(), I = K.squaredNorm();
-  // phi = a(D) I + b(D) with a = 1 / (2 D), b = (D + 1 / D) / 2 - 2.
-  const double a = 0.5 / D, a1 = -a / D, a2 = -2.0 * a1 / D;
-  const double slope = a1 * I + 0.5 * (1.0 - 1.0 / (D * D));
-  const double curvature = a2 * I + 1.0 / (D * D * D);
+  // phi = a(D) I + b(D) with a = shape / (2 D), b = area (D + 1 / D) up to a constant.
+  const double a = 0.5 * weights.shape / D, a1 = -a / D, a2 = -2.0 * a1 / D;
+  const double slope = a1 * I + weights.area * (1.0 - 1.0 / (D * D));
+  const double curvature = a2 * I + 2.0 * weights.area / (D * D * D);
   Matrix2d cof;
   cof << K(1, 1), -K(1, 0), -K(0, 1), K(0, 0);
   P = 2.0 * a * K + slope * cof;
@@ -52,7 +54,7 @@ double triangle_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H)
   flip << 0.0, 1.0, 1.0, 0.0;
   add(2.0 * a + slope, std::sqrt(0.5) * twist);
   add(2.0 * a - slope, std::sqrt(0.5) * flip);
-  return a * I + 0.5 * (D + 1.0 / D) - 2.0;
+  return triangle_energy(K, weights);
 }
 
-}  // namespace stretchmap::registration
+}  // namespace stretchmap::area

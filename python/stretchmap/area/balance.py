@@ -1,0 +1,70 @@
+"""Equal areas in the flat chart where the fixed point of Algorithm 4.1 jams.
+
+A conformal map of a body with a small handle gives most of the chart to the handle: area ratios
+over nine orders. A step of (4.5) then ends at the first face about to fold, and so do all that
+follow. Newton steps towards areas a bounded factor away get there (chart_newton.hpp).
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.progress import Progress, report
+from ..maps.history import IterationRecord
+
+if TYPE_CHECKING:
+    pass
+
+# Excess of E_S over its bound, the variance of the ratios, up to which (4.5) has done its work.
+JAMMED = 1e-2
+_STEPS = 100
+_SHAPE = 0.1  # weight of the shape term against which the area term grows
+_GROWTH, _MOST_WEIGHT = 4.0, 64.0
+_REACH, _MOST_REACH = 4.0, 1e6  # factors of area asked for in one step
+_LONG, _FULL = 0.5, 0.9  # steps that let the weight, the reach grow
+_NEARLY = 0.95  # share of the area within reach from which on the weight grows
+_FAIR = 0.1  # face SD the polyhedral steps can start from
+_SETTLED = 0.02  # share of the energy; a step that lowers it by less was the last
+
+
+def balance_areas(
+    chart: _core.area.SurfaceChart,
+    reference: _core.area.SurfaceReference,
+    aspect: float,
+    turns: NDArray[np.float64],
+    progress: Progress | None,
+) -> tuple[NDArray[np.float64], list[IterationRecord]]:
+    """Turns (n, 2) with nearly equal area ratios, from turns without folded faces; records."""
+    start = time.perf_counter()
+    newton = _core.area.ChartNewton(chart, reference, aspect, turns)
+    history: list[IterationRecord] = []
+    weight, reach = 1.0, _REACH
+    for iteration in range(1, _STEPS + 1):
+        taken = newton.step(1.0, _SHAPE / weight, reach)
+        figures = newton.figures()
+        history.append(
+            IterationRecord(
+                stage="balance",
+                iteration=iteration,
+                energy=taken.after,
+                step=taken.step,
+                residual=taken.decrement,
+                flips=figures.flips,
+                ring_std=figures.ring_sd,
+                element_std=figures.face_sd,
+                seconds=time.perf_counter() - start,
+            )
+        )
+        report(progress, "area", iteration, _STEPS, face_sd=figures.face_sd)
+        done = taken.before - taken.after < _SETTLED * taken.before
+        if taken.step == 0.0 or (taken.within > 1.0 - 1e-9 and (figures.face_sd < _FAIR or done)):
+            break
+        if taken.step > _LONG and taken.within > _NEARLY:
+            weight = min(weight * _GROWTH, _MOST_WEIGHT)
+        reach = min(2.0 * reach, _MOST_REACH) if taken.step >= _FULL else max(_REACH, 0.5 * reach)
+    return newton.turns, history
