@@ -127,9 +127,9 @@ void bind_area(py::module_& m) {
       "glide_energy",
       [](const area::GlideProblem& problem, double area, double shape, double chart, double scale,
          const Points2Ref& angles, bool model, double facing, double epsilon) {
-        area::GlideEnergy energy = area::glide_energy(
-            problem, {area, shape, chart, facing, epsilon}, scale, angles,
-            model ? area::Derivatives::kModel : area::Derivatives::kHessian);
+        area::GlideEnergy energy =
+            area::glide_energy(problem, {area, shape, chart, facing, epsilon}, scale, angles,
+                               model ? area::Derivatives::kModel : area::Derivatives::kHessian);
         const area::SurfacePattern pattern(problem.chart.faces, problem.chart.n_vertices, 2);
         SparseMatrix hessian = pattern.zeros();
         pattern.scatter(energy.hessians, hessian.valuePtr());

@@ -38,8 +38,7 @@ bool inside(const TorusPoint (&p)[3], const Vector2d& way) {
 void add_component(const TorusPoint (&p)[3], const Vector3d& w, double factor, bool second,
                    Jet& jet) {
   for (int i = 0; i < 3; ++i) {
-    const Vector3d by_point =
-        0.5 * factor * (p[(i + 1) % 3].point - p[(i + 2) % 3].point).cross(w);
+    const Vector3d by_point = 0.5 * factor * (p[(i + 1) % 3].point - p[(i + 2) % 3].point).cross(w);
     jet.gradient.segment<2>(2 * i) += p[i].tangent.transpose() * by_point;
     if (!second) continue;
     jet.hessian.block<2, 2>(2 * i, 2 * i) += p[i].curvature(by_point);
@@ -110,16 +109,14 @@ Jet corner_facing(const TorusPoint (&p)[3], int k, bool second) {
 }
 
 Facing facing(const TorusPoint (&p)[3], double axis, double tube, bool second) {
-  Facing result{{corner_facing(p, 0, second), corner_facing(p, 1, second),
-                 corner_facing(p, 2, second)},
-                {}};
+  Facing result{
+      {corner_facing(p, 0, second), corner_facing(p, 1, second), corner_facing(p, 2, second)}, {}};
   const Vector3d area = area_vector(p);
   if (inside(p, area.head<2>()))
     result.least = inner_facing(p, area, axis, tube, second);
   else
-    result.least =
-        *std::min_element(result.corner, result.corner + 3,
-                          [](const Jet& a, const Jet& b) { return a.value < b.value; });
+    result.least = *std::min_element(result.corner, result.corner + 3,
+                                     [](const Jet& a, const Jet& b) { return a.value < b.value; });
   return result;
 }
 

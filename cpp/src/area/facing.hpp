@@ -2,8 +2,8 @@
 //
 // With A the area vector of the face and c(x) the point of the torus' center circle nearest to x,
 // A . (x - c(x)) > 0 on the whole face is what makes the polyhedron a graph over the torus (see
-// certificate/torus_graph.hpp). A . x is constant on the face, so it is the least of a cosine on the
-// face's interval of u: taken at a corner, or where u has the direction of A.
+// certificate/torus_graph.hpp). A . x is constant on the face, so it is the least of a cosine on
+// the face's interval of u: taken at a corner, or where u has the direction of A.
 #pragma once
 
 #include "area/face_jet.hpp"

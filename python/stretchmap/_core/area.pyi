@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.mesh
 import typing
-__all__: list[str] = ['GlideProblem', 'GlideStep', 'SemStep', 'SurfaceChart', 'SurfaceFigures', 'SurfaceNewton', 'SurfaceQuality', 'SurfaceReference', 'SurfaceSem', 'angle_from_equal_area', 'phase_qualities', 'turn_areas']
+__all__: list[str] = ['ChartNewton', 'ChartStep', 'GlideProblem', 'GlideStep', 'SemStep', 'SurfaceChart', 'SurfaceFigures', 'SurfaceNewton', 'SurfaceQuality', 'SurfaceReference', 'SurfaceSem', 'angle_from_equal_area', 'phase_qualities', 'turn_areas']
 class SurfaceChart:
     def __init__(self, topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]) -> None:
         ...
@@ -53,7 +53,7 @@ class SurfaceSem:
     def turns(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
         ...
 class SurfaceReference:
-    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"]) -> None:
+    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], max_aspect: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
         ...
     @property
     def areas(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -75,7 +75,7 @@ class SurfaceQuality:
     def face_sd(self) -> float:
         ...
 class GlideProblem:
-    def __init__(self, chart: SurfaceChart, reference: SurfaceReference, ratio: typing.SupportsFloat | typing.SupportsIndex, facing: bool = False) -> None:
+    def __init__(self, chart: SurfaceChart, reference: SurfaceReference, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class GlideStep:
     @property
@@ -95,12 +95,40 @@ class SurfaceNewton:
         ...
     def figures(self) -> SurfaceFigures:
         ...
-    def project_rings(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, chart: typing.SupportsFloat | typing.SupportsIndex, face_sd: typing.SupportsFloat | typing.SupportsIndex, face_error: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+    def least_facing(self) -> float:
         ...
-    def step(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, chart: typing.SupportsFloat | typing.SupportsIndex) -> GlideStep:
+    def project_rings(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, chart: typing.SupportsFloat | typing.SupportsIndex, facing: typing.SupportsFloat | typing.SupportsIndex, face_sd: typing.SupportsFloat | typing.SupportsIndex, face_error: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        ...
+    def step(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, chart: typing.SupportsFloat | typing.SupportsIndex, facing: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> GlideStep:
         ...
     @property
     def angles(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        ...
+class ChartStep:
+    @property
+    def after(self) -> float:
+        ...
+    @property
+    def before(self) -> float:
+        ...
+    @property
+    def decrement(self) -> float:
+        ...
+    @property
+    def step(self) -> float:
+        ...
+    @property
+    def within(self) -> float:
+        ...
+class ChartNewton:
+    def __init__(self, chart: SurfaceChart, reference: SurfaceReference, aspect: typing.SupportsFloat | typing.SupportsIndex, turns: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None:
+        ...
+    def figures(self) -> SurfaceFigures:
+        ...
+    def step(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, reach: typing.SupportsFloat | typing.SupportsIndex) -> ChartStep:
+        ...
+    @property
+    def turns(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
         ...
 def angle_from_equal_area(s: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], tube_ratio: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...

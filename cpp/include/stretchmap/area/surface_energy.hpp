@@ -31,7 +31,7 @@ struct SurfaceWeights {
 struct GlideProblem {
   SurfaceChart chart;
   SurfaceReference reference;
-  double ratio = 2.0;   // R / r
+  double ratio = 2.0;  // R / r
 };
 
 struct GlideEnergy {
