@@ -28,6 +28,11 @@ def _load_core() -> None:
 
 _load_core()
 
+if hasattr(os, "register_at_fork"):
+    # A forked process computes with one thread: those of its parent are not there any more.
+    _base = importlib.import_module(f"{__name__}._core").base
+    os.register_at_fork(after_in_child=_base.keep_to_one_thread)
+
 # What type checkers see; at run time `_EXPORTS` loads the same names on first use, so that
 # `import stretchmap` stays fast.
 if TYPE_CHECKING:

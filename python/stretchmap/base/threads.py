@@ -23,6 +23,10 @@ def threads(count: int | None) -> Iterator[None]:
     The number belongs to the calling Python thread, others keep theirs; afterwards it is what it
     was. Results do not depend on it, to the last bit.
 
+    A forked process (``multiprocessing`` forks by default on Linux up to Python 3.13) computes with
+    one thread whatever is asked, since the OpenMP runtime does not survive a fork. Threads started
+    there, and processes that are spawned, have as many as they like.
+
     Parameters
     ----------
     count : int or None
