@@ -70,6 +70,9 @@ if TYPE_CHECKING:
     from .measures.elements import Distortion as Distortion
     from .measures.elements import distortion as distortion
     from .mesh.diagnosis import Diagnosis as Diagnosis
+    from .mesh.foreign import from_meshio as from_meshio
+    from .mesh.foreign import from_pyvista as from_pyvista
+    from .mesh.foreign import from_trimesh as from_trimesh
     from .mesh.meshes import TetMesh as TetMesh
     from .mesh.meshes import TriMesh as TriMesh
     from .mesh.tetrahedralize import tetrahedralize as tetrahedralize
@@ -98,6 +101,9 @@ _EXPORTS = {
     "TetMesh": "mesh.meshes",
     "TriMesh": "mesh.meshes",
     "Diagnosis": "mesh.diagnosis",
+    "from_meshio": "mesh.foreign",
+    "from_pyvista": "mesh.foreign",
+    "from_trimesh": "mesh.foreign",
     "tetrahedralize": "mesh.tetrahedralize",
     "read": "io.read_write",
     "read_solid": "io.read_write",

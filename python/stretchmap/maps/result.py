@@ -29,6 +29,7 @@ from ..base.torus import TWO_PI, Torus
 from ..errors import OptionError
 from ..io.npz import save_npz
 from ..measures.elements import Distortion, distortion
+from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
 from .history import IterationRecord
 from .points import PointMap
@@ -52,7 +53,7 @@ Kind = Literal[
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class MapResult(HasSummary):
+class MapResult(HasSummary, Exchanged):
     """A piecewise-affine map, given by the image of each vertex.
 
     Attributes
@@ -272,11 +273,13 @@ class MapResult(HasSummary):
         Parameters
         ----------
         path : path-like
-            ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``: the source mesh with
-            ``image`` as point data and the ratios as cell data. ``.obj`` of a surface with angles:
-            the source with (u, v) in turns as texture coordinates. The other formats of
-            :func:`stretchmap.write` hold no arrays and get the image itself, of a solid where they
-            can hold one and of its surface where not.
+            ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``, ``.xdmf``: the source
+            mesh; as point data ``image``, ``ring_ratio`` and, on a torus, ``u``, ``v``, ``s`` with
+            ``cos_u``, ``sin_u``, ``cos_v``, ``sin_v``, which have no seam where the angles start
+            anew; as cell data ``ratio`` and, of a refined solid, ``parent_tet``. ``.obj`` of a
+            surface with angles: the source with (u, v) in turns as texture coordinates. The other
+            formats of :func:`stretchmap.write` hold no arrays and get the image itself, of a solid
+            where they can hold one and of its surface where not.
 
         Raises
         ------
@@ -291,13 +294,8 @@ class MapResult(HasSummary):
         if suffix == ".npz":
             self._save_npz(path)
         elif suffix in (".vtu", ".vtk", ".xdmf"):
-            arrays = {
-                name: array
-                for name, array in self.extra_arrays().items()
-                if array.shape[:1] == (len(mesh.V),) and array.ndim <= 2
-            }
-            arrays |= {"image": self.image, "ring_ratio": d.ring_ratios}
-            io.write(path, mesh, point_data=arrays, cell_data={"ratio": d.ratios})
+            given = self.as_cells()
+            io.write(path, mesh, point_data=given.point_data, cell_data=given.cell_data)
         elif isinstance(mesh, TetMesh):
             if suffix in io.suffixes(solid=True):
                 io.write(path, TetMesh(self.image, mesh.T), cell_data={"ratio": d.ratios})
@@ -307,6 +305,24 @@ class MapResult(HasSummary):
             io.write(path, mesh, corner_uv=corner_turns(mesh.F, self.angles))
         else:
             io.write(path, TriMesh(self.image, mesh.F), cell_data={"ratio": d.ratios})
+
+    def as_cells(self) -> Cells:
+        """The source with all fields of the map, as viewers and solvers take them."""
+        mesh, cells = self.mesh, elements(self.mesh)
+        points = {"image": self.image, "ring_ratio": self.distortion.ring_ratios}
+        ratios = {"ratio": self.distortion.ratios}
+        for name, array in self.extra_arrays().items():
+            if array.ndim in (1, 2) and array.dtype.kind in "biuf" and name not in points:
+                if len(array) == len(mesh.V):
+                    points[name] = array
+                elif len(array) == len(cells):
+                    ratios[name] = array
+        if self.torus is not None:
+            u, v, s = self.torus.coordinates(self.image)
+            points |= {"u": u, "v": v, "s": s, "cos_u": np.cos(u), "sin_u": np.sin(u)}
+            points |= {"cos_v": np.cos(v), "sin_v": np.sin(v)}
+        kind = "tetra" if isinstance(mesh, TetMesh) else "triangle"
+        return Cells(mesh.V, kind, cells, points, ratios)
 
     def _save_npz(self, path: Path) -> None:
         mesh = self.mesh

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import KindError
+from .foreign import converted
 from .meshes import TetMesh, TriMesh
 
 __all__ = ["as_mesh", "as_solid", "as_surface", "require_same_mesh"]
@@ -18,7 +19,7 @@ def as_surface(mesh: Any, name: str = "surface") -> TriMesh:
 
     Parameters
     ----------
-    mesh : TriMesh
+    mesh : TriMesh, mesh of PyVista, trimesh or meshio, or tuple (V, F)
     name : str
         What the caller names it, for messages.
 
@@ -27,6 +28,7 @@ def as_surface(mesh: Any, name: str = "surface") -> TriMesh:
     KindError
         It is something else; says how to get a surface from it.
     """
+    mesh = converted(mesh)
     if isinstance(mesh, TriMesh):
         return mesh
     if isinstance(mesh, TetMesh):
@@ -38,6 +40,7 @@ def as_surface(mesh: Any, name: str = "surface") -> TriMesh:
 
 def as_solid(mesh: Any, name: str = "solid") -> TetMesh:
     """The argument as a solid; as `as_surface`."""
+    mesh = converted(mesh)
     if isinstance(mesh, TetMesh):
         return mesh
     if isinstance(mesh, TriMesh):
@@ -50,6 +53,7 @@ def as_solid(mesh: Any, name: str = "solid") -> TetMesh:
 
 def as_mesh(mesh: Any, name: str = "mesh") -> TriMesh | TetMesh:
     """The argument as a surface or a solid; as `as_surface`."""
+    mesh = converted(mesh)
     if isinstance(mesh, (TriMesh, TetMesh)):
         return mesh
     raise KindError(

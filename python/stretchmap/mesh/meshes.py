@@ -18,6 +18,7 @@ from ..base.arrays import as_indices, as_points, read_only
 from ..base.options import flag
 from ..base.tables import html, table
 from .diagnosis import Diagnosis, diagnose_solid, diagnose_surface
+from .exchange import Cells, Exchanged
 
 __all__ = ["TetMesh", "TriMesh"]
 
@@ -25,7 +26,7 @@ __all__ = ["TetMesh", "TriMesh"]
 _NO_GENUS = ("nonmanifold_edges", "nonmanifold_vertices", "border_edges", "not_orientable")
 
 
-class _Mesh:
+class _Mesh(Exchanged):
     """What both kinds share: points, immutability, pickling."""
 
     V: NDArray[np.float64]
@@ -190,6 +191,10 @@ class TriMesh(_Mesh):
     @cached_property
     def _diagnosis(self) -> Diagnosis:
         return diagnose_surface(self.V, self.F)
+
+    def as_cells(self) -> Cells:
+        """Points, cells and all fields."""
+        return Cells(self.V, "triangle", self.F)
 
     def diagnose(self) -> Diagnosis:
         """List every defect with its ids.
@@ -357,6 +362,10 @@ class TetMesh(_Mesh):
     @cached_property
     def _diagnosis(self) -> Diagnosis:
         return diagnose_solid(self.V, self.T)
+
+    def as_cells(self) -> Cells:
+        """Points, cells and all fields."""
+        return Cells(self.V, "tetra", self.T)
 
     def diagnose(self) -> Diagnosis:
         """List every defect with its ids.

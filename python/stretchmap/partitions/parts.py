@@ -34,6 +34,7 @@ from ..base.tables import HasSummary, plain_dict, table
 from ..errors import OptionError
 from ..maps.given import as_map_of_solid, torus_of
 from ..maps.result import MapResult
+from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
 from .cutting import Pieces, cut_all, part_volumes
 from .levels import cut_nested, levels_of, shares_of
@@ -46,7 +47,7 @@ _MOST_TURNS = 1e3  # radians a start may be away from zero
 
 
 @dataclass(frozen=True, eq=False)
-class Partition(HasSummary):
+class Partition(HasSummary, Exchanged):
     """A solid cut into parts.
 
     Attributes
@@ -174,12 +175,13 @@ class Partition(HasSummary):
         """
         from .. import io
 
-        io.write(
-            path,
-            self.solid,
-            point_data={"image": self.image},
-            cell_data={"part": self.labels, "parent_tet": self.parent_tet},
-        )
+        given = self.as_cells()
+        io.write(path, self.solid, point_data=given.point_data, cell_data=given.cell_data)
+
+    def as_cells(self) -> Cells:
+        """Points, cells and all fields."""
+        fields = {"part": self.labels, "parent_tet": self.parent_tet}
+        return Cells(self.solid.V, "tetra", self.solid.T, {"image": self.image}, fields)
 
 
 def _asked(

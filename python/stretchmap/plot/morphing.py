@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -19,6 +19,7 @@ from ..base.options import as_path, flag, whole
 from ..base.tables import HasSummary, plain_dict, table
 from ..errors import FileFormatError, OptionError
 from ..maps.given import as_map_of_solid
+from ..mesh.exchange import Cells
 from ..mesh.meshes import TetMesh
 
 if TYPE_CHECKING:
@@ -51,12 +52,15 @@ class Morph(HasSummary):
     flips : ndarray of int, shape (f,)
         Tets that are not positive in each frame. Both ends may be free of them and the way between
         not: nothing protects a linear homotopy.
+    fields : Cells
+        The source with the fields of the map, which every frame of a ``.pvd`` carries.
     """
 
     solid: TetMesh
     image: NDArray[np.float64]
     times: NDArray[np.float64]
     flips: NDArray[np.intp]
+    fields: Cells = field(repr=False)
 
     def frame(self, i: int) -> NDArray[np.float64]:
         """(n, 3) vertices of frame i.
@@ -113,7 +117,8 @@ class Morph(HasSummary):
             # The frames appear together, once all of them are written.
             for i, frame in enumerate(frames):
                 temporary = stack.enter_context(atomic_path(frame))
-                io.write(temporary, TetMesh(self.frame(i), self.solid.T))
+                solid = TetMesh(self.frame(i), self.solid.T)
+                io.write(temporary, solid, self.fields.point_data, self.fields.cell_data)
             with atomic_path(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
         return [*frames, path]
@@ -189,4 +194,5 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
         )
         for t in times
     ]
-    return Morph(solid, read_only(image), read_only(times), read_only(np.array(flips)))
+    fields = result.as_cells()
+    return Morph(solid, read_only(image), read_only(times), read_only(np.array(flips)), fields)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import read_only
 from ..base.tables import HasSummary, plain_dict, table
+from ..mesh.exchange import Cells, Exchanged
 from .hex_files import write_hexahedra
 
 __all__ = ["HexMesh"]
@@ -20,7 +21,7 @@ _SHARES_BELOW = (0.2, 0.3, 0.5)
 
 
 @dataclass(frozen=True, eq=False)
-class HexMesh(HasSummary):
+class HexMesh(HasSummary, Exchanged):
     """A structured hexahedral mesh of a solid.
 
     Attributes
@@ -137,14 +138,16 @@ class HexMesh(HasSummary):
         OSError
             If the file cannot be written.
         """
-        points = {
-            **dict(zip("uvs", self.coordinates.T, strict=True)),
-            "grid": self.grid,
-        }
+        given = self.as_cells()
+        write_hexahedra(path, self.V, self.H, given.point_data, given.cell_data)
+
+    def as_cells(self) -> Cells:
+        """Points, cells and all fields."""
+        points = {**dict(zip("uvs", self.coordinates.T, strict=True)), "grid": self.grid}
         cells: dict[str, NDArray[Any]] = {
             "block": self.block,
             "layer": self.layer,
             "scaled_jacobian": self.scaled_jacobians,
             "volume_ratio": self.volume_ratios,
         }
-        write_hexahedra(path, self.V, self.H, points, cells)
+        return Cells(self.V, "hexahedron", self.H, points, cells)

@@ -21,6 +21,7 @@ from ..certificate.checks import certify
 from ..certificate.findings import Certificate
 from ..errors import CertificationError, DegenerateError, OptionError
 from ..maps.result import MapResult
+from ..mesh.given import as_solid
 from ..mesh.overconstrained import overconstrained_elements
 from ..mesh.refinement import Refinement, refine_overconstrained
 from .options import FlipFreeOptions
@@ -204,6 +205,7 @@ def volume_map(
     Before a run of more than a million tets the logger ``"stretchmap"`` says (level INFO) how much
     memory to expect: about 600 bytes per tet for ``"vsem"``, 1300 for ``"certified"``.
     """
+    solid = as_solid(solid)
     if method is None:
         method = "certified" if c is None else "vsem"
     _check_options(method, boundary, c, max_iter, tol, start, torus, boundary_map)

@@ -1,0 +1,88 @@
+"""Meshes of PyVista, trimesh and meshio, and pairs of arrays, as meshes of ours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import KindError
+from .meshes import TetMesh, TriMesh
+
+__all__ = ["converted", "from_meshio", "from_pyvista", "from_trimesh"]
+
+
+def from_pyvista(data: Any) -> TriMesh | TetMesh:
+    """A surface from ``pyvista.PolyData``, a surface or a solid from ``UnstructuredGrid``.
+
+    Parameters
+    ----------
+    data : pyvista.PolyData or pyvista.UnstructuredGrid
+        Of triangles, or of tets with or without triangles. Row i of ``V`` is its point i.
+
+    Raises
+    ------
+    KindError
+        It is another object, or holds other cells.
+    MeshError
+        The arrays are not a mesh.
+    """
+    if not _is_of(data, "pyvista"):
+        raise KindError(f"a PolyData or UnstructuredGrid is needed, got {type(data).__name__}")
+    if hasattr(data, "regular_faces"):
+        if not data.is_all_triangles:
+            raise KindError("the PolyData holds polygons; pass data.triangulate()")
+        return TriMesh(np.asarray(data.points), np.asarray(data.regular_faces))
+    if not hasattr(data, "cells_dict"):
+        raise KindError(f"a PolyData or UnstructuredGrid is needed, got {type(data).__name__}")
+    cells = {int(kind): np.asarray(ids) for kind, ids in data.cells_dict.items()}
+    return _mesh(data.points, cells.pop(5, None), cells.pop(10, None), [*cells])
+
+
+def from_trimesh(data: Any) -> TriMesh:
+    """A surface from ``trimesh.Trimesh``; raises as `from_pyvista`."""
+    if not _is_of(data, "trimesh") or not hasattr(data, "faces"):
+        raise KindError(f"a trimesh.Trimesh is needed, got {type(data).__name__}")
+    return TriMesh(np.asarray(data.vertices), np.asarray(data.faces))
+
+
+def from_meshio(data: Any) -> TriMesh | TetMesh:
+    """A solid from ``meshio.Mesh`` where it holds tets, else a surface; as `from_pyvista`."""
+    if not _is_of(data, "meshio") or not hasattr(data, "cells"):
+        raise KindError(f"a meshio.Mesh is needed, got {type(data).__name__}")
+    blocks: dict[str, list[NDArray[Any]]] = {}
+    for block in data.cells:
+        if len(block.data) and block.type not in ("vertex", "line", "line3"):
+            blocks.setdefault(block.type, []).append(np.asarray(block.data))
+    cells = {kind: np.concatenate(parts) for kind, parts in blocks.items()}
+    return _mesh(data.points, cells.pop("triangle", None), cells.pop("tetra", None), [*cells])
+
+
+def converted(given: Any) -> Any:
+    """A mesh of a library or a pair (V, F) or (V, T) as ours; anything else as it is."""
+    if _is_of(given, "pyvista"):
+        return from_pyvista(given)
+    if _is_of(given, "trimesh"):
+        return from_trimesh(given)
+    if _is_of(given, "meshio"):
+        return from_meshio(given)
+    if isinstance(given, tuple) and len(given) == 2:
+        width = np.shape(given[1])[-1:] if isinstance(given[1], (np.ndarray, list)) else ()
+        if width in ((3,), (4,)):
+            return TetMesh(*given) if width == (4,) else TriMesh(*given)
+    return given
+
+
+def _is_of(given: Any, library: str) -> bool:
+    """Whether the object's class, or a base of it, is one of a library; imports nothing."""
+    return any(kind.__module__.split(".")[0] == library for kind in type(given).__mro__)
+
+
+def _mesh(points: Any, faces: Any, tets: Any, others: list[Any]) -> TriMesh | TetMesh:
+    if others or (faces is None and tets is None):
+        found = ", ".join(map(str, others)) or "no cells"
+        raise KindError(f"only triangles and tets can be used, the mesh holds {found}")
+    if tets is not None:
+        return TetMesh(np.asarray(points), tets)
+    return TriMesh(np.asarray(points), faces)

@@ -1,0 +1,126 @@
+"""Meshes and fields go to PyVista, trimesh and meshio and come back bit for bit."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+import shapes
+import stretchmap as sm
+from stretchmap import samples
+from stretchmap.errors import KindError, MissingDependencyError
+from stretchmap.io import read_arrays
+from stretchmap.mesh.given import as_mesh, as_solid, as_surface
+
+
+@pytest.fixture
+def surface() -> sm.TriMesh:
+    points, faces = shapes.torus()
+    return sm.TriMesh(points / 3, faces)
+
+
+@pytest.fixture
+def solid() -> sm.TetMesh:
+    points, tets = shapes.cubes(shapes.RING)
+    return sm.TetMesh(points / 3, tets)
+
+
+def same(first, second) -> None:
+    assert type(first) is type(second)
+    np.testing.assert_array_equal(first.V, second.V)
+    key = "T" if isinstance(first, sm.TetMesh) else "F"
+    np.testing.assert_array_equal(getattr(first, key), getattr(second, key))
+
+
+@pytest.mark.parametrize("library", ["pyvista", "trimesh", "meshio"])
+def test_a_surface_goes_and_comes_back(library, surface):
+    pytest.importorskip(library)
+    there = getattr(surface, f"to_{library}")()
+    same(getattr(sm, f"from_{library}")(there), surface)
+    same(as_surface(there), surface)
+    same(as_mesh(there), surface)
+
+
+@pytest.mark.parametrize("library", ["pyvista", "meshio"])
+def test_a_solid_goes_and_comes_back(library, solid):
+    pytest.importorskip(library)
+    there = getattr(solid, f"to_{library}")()
+    same(getattr(sm, f"from_{library}")(there), solid)
+    same(as_solid(there), solid)
+
+
+def test_what_goes_out_is_a_copy(surface):
+    pytest.importorskip("meshio")
+    there = surface.to_meshio()
+    there.points[0] = 7.0
+    assert not (surface.V[0] == 7.0).any()
+
+
+def test_pairs_are_taken(surface, solid):
+    same(as_surface((surface.V, surface.F)), surface)
+    same(as_solid((solid.V.tolist(), solid.T.tolist())), solid)
+    with pytest.raises(KindError, match="TriMesh was given"):
+        as_solid((surface.V, surface.F))
+
+
+def test_maps_take_them_all(surface, solid):
+    pyvista = pytest.importorskip("pyvista")
+    basis = sm.homology_basis(pyvista.PolyData.from_regular_faces(surface.V, surface.F))
+    assert basis.genus == 1
+    assert sm.distortion((solid.V, solid.T), solid.V).flips == 0
+    mapped = sm.volume_map(samples.solid_torus(600).to_pyvista())
+    assert mapped.certificate.certified
+
+
+def test_fields_of_a_map_go_along():
+    pytest.importorskip("pyvista")
+    pytest.importorskip("meshio")
+    result = sm.volume_map(samples.solid_torus(600))
+    u, v, s = result.coordinates().T
+    for there in (result.to_pyvista(), result.to_meshio()):
+        for name, values in (("u", u), ("v", v), ("s", s), ("image", result.image)):
+            np.testing.assert_array_equal(there.point_data[name], values)
+        np.testing.assert_array_equal(there.point_data["cos_u"] ** 2, np.cos(u) ** 2)
+    np.testing.assert_array_equal(result.to_pyvista().cell_data["ratio"], result.distortion.ratios)
+    parts = sm.partition(result, 2)
+    np.testing.assert_array_equal(parts.to_pyvista().cell_data["part"], parts.labels)
+    grid = sm.hex_mesh(result, sections=12, block=2, rings=1)
+    there = grid.to_pyvista()
+    np.testing.assert_array_equal(there.cells_dict[12], grid.H)
+    np.testing.assert_array_equal(there.points, grid.V)
+    with pytest.raises(KindError, match="triangles only"):
+        grid.to_trimesh()
+
+
+def test_other_cells_and_objects_are_refused(surface):
+    pyvista = pytest.importorskip("pyvista")
+    with pytest.raises(KindError, match="triangulate"):
+        sm.from_pyvista(pyvista.Cube())
+    with pytest.raises(KindError, match="holds 12"):
+        sm.from_pyvista(pyvista.UnstructuredGrid({12: np.arange(8)[None]}, np.eye(8, 3)))
+    for convert in (sm.from_pyvista, sm.from_trimesh, sm.from_meshio):
+        with pytest.raises(KindError, match="is needed"):
+            convert(surface)
+
+
+def test_a_missing_library_is_named(surface, monkeypatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(MissingDependencyError, match=r"stretchmap\[interop\]"):
+        surface.to_trimesh()
+
+
+def test_files_for_viewers_carry_the_coordinates(tmp_path):
+    pytest.importorskip("meshio")
+    result = sm.volume_map(samples.solid_torus(600))
+    u, v, s = result.coordinates().T
+    wanted = {"u": u, "v": v, "s": s, "cos_u": np.cos(u), "sin_u": np.sin(u)}
+    wanted |= {"cos_v": np.cos(v), "sin_v": np.sin(v), "image": result.image}
+    result.save(tmp_path / "map.vtu")
+    sm.morph(result, 2).save(tmp_path / "morph.pvd")
+    for name in ("map.vtu", "morph_001.vtu"):
+        found = read_arrays(tmp_path / name)
+        for field, values in wanted.items():
+            np.testing.assert_array_equal(found.point_data[field], values)
+        np.testing.assert_array_equal(found.cell_data["ratio"], result.distortion.ratios)
