@@ -19,7 +19,7 @@ def grid_numbers(ratio: float, n_hexahedra: float) -> tuple[int, int, int]:
     Examples
     --------
     >>> grid_numbers(3.0, 5000)
-    (78, 5, 2)
+    (77, 5, 2)
     """
     block = max(1, round((n_hexahedra / (_SECTIONS * ratio)) ** (1.0 / 3.0)))
     rings = max(min(block, 2), round(block / 3.0))
