@@ -99,10 +99,9 @@ Jet corner_facing(const TorusPoint (&p)[3], int k, bool second) {
   }
   // Second derivatives of the normal: those of the point of a tube of radius one on a circle of
   // radius nought.
-  const double scale_v = bend_v;
   Matrix2d own;
   own(0, 0) = bend_u * area.dot(p[k].uu);
-  own(0, 1) = own(1, 0) = scale_v * area.dot(p[k].uv);
+  own(0, 1) = own(1, 0) = bend_v * area.dot(p[k].uv);
   own(1, 1) = -area.dot(normal);
   jet.hessian.block<2, 2>(2 * k, 2 * k) += own;
   return jet;

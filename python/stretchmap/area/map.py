@@ -21,6 +21,7 @@ from ..certificate.findings import Certificate
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import CertificationError, OptionError
 from ..maps.result import MapResult
+from ..mesh.given import require_same_mesh
 from .balance import JAMMED, balance_areas
 from .finish import finish_areas, unfold_faces
 from .search import Ratio, search_phase
@@ -189,8 +190,8 @@ def area_map(
         Faces of the polyhedral image stay folded, or the surface crosses itself; ``ids`` are faces.
     SolverError
         No start without flipped faces was found; ``ids`` are the faces.
-    GenusError, MeshError
-        As `conformal_map`.
+    GenusError, KindError, MeshError
+        As `conformal_map`; ``conformal`` or ``basis`` is of another surface.
 
     Notes
     -----
@@ -205,6 +206,12 @@ def area_map(
     seconds: dict[str, float] = {}
     if conformal is None:
         conformal = conformal_map(surface, basis=basis, progress=progress)
+    require_same_mesh(
+        surface,
+        conformal.mesh,
+        "the conformal map is of another surface",
+        "pass conformal_map(surface), or leave it out",
+    )
     clock = _lap(seconds, "conformal", clock)
 
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)

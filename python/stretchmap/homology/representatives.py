@@ -8,14 +8,17 @@ import numpy as np
 
 from .. import _core
 from ..base.arrays import read_only
+from ..forms.harmonic import HarmonicForms, Weights, solve_harmonic
+from ..forms.holomorphic import HolomorphicForms
+from ..mesh.given import require_same_mesh
 
 if TYPE_CHECKING:
     from ..homology.basis import HomologyBasis
     from ..mesh.meshes import TriMesh
-from ..forms.harmonic import HarmonicForms, Weights, solve_harmonic
-from ..forms.holomorphic import HolomorphicForms
 
 __all__ = ["harmonic_forms", "holomorphic_forms"]
+
+_REMEDY = "pass homology_basis(surface), or leave it out"
 
 
 def harmonic_forms(
@@ -42,6 +45,8 @@ def harmonic_forms(
     ------
     MeshError
         As `homology_basis`.
+    KindError
+        The basis is of another surface.
     OptionError
         Unknown weights.
     SolverError
@@ -61,6 +66,7 @@ def harmonic_forms(
         from ..homology.basis import homology_basis
 
         basis = homology_basis(surface)
+    require_same_mesh(surface, basis.surface, "the basis is of another surface", _REMEDY)
     if weights == basis.harmonic.weights:
         return basis.harmonic
     return solve_harmonic(surface, basis.dual_forms, weights)
@@ -83,8 +89,8 @@ def holomorphic_forms(surface: TriMesh, basis: HomologyBasis | None = None) -> H
 
     Raises
     ------
-    MeshError, SolverError
-        As `homology_basis`.
+    MeshError, KindError, SolverError
+        As `harmonic_forms`.
 
     Examples
     --------

@@ -21,7 +21,7 @@ from ..certificate.checks import certify
 from ..certificate.findings import Certificate
 from ..errors import CertificationError, DegenerateError, OptionError
 from ..maps.result import MapResult
-from ..mesh.given import as_solid
+from ..mesh.given import as_solid, require_same_mesh
 from ..mesh.overconstrained import overconstrained_elements
 from ..mesh.refinement import Refinement, refine_overconstrained
 from .options import FlipFreeOptions
@@ -195,6 +195,8 @@ def volume_map(
         ``refine=False`` and some interior edge or face cannot be repaired; ``ids`` are the tets.
     CertificationError
         The certified route left flipped tets or failed the certificate, ``ids`` are the elements.
+    KindError
+        ``boundary_map`` is of another surface than the solid's.
     OptionError
         An option out of range or combined with one it excludes.
     SolverError
@@ -235,6 +237,13 @@ def volume_map(
             progress=progress,
         )  # fmt: skip
         seconds["boundary"] = time.perf_counter() - clock
+    elif boundary_map is not None:
+        require_same_mesh(
+            solid.surface,
+            boundary_map.mesh,
+            "boundary_map is of another surface",
+            "pass area_map(solid.surface)",
+        )
 
     refinement = None
     if certified:

@@ -261,6 +261,23 @@ def test_long_triangles_are_rounded_for_the_shape_terms() -> None:
     assert round_.cotan.sum() == pytest.approx(np.sqrt(3.0) * (4.0 + 0.25) / 2.0, rel=1e-9)
 
 
+def test_a_basis_or_map_of_another_surface_is_refused(bumpy: TriMesh) -> None:
+    other = TriMesh(bumpy.V * [1.0, 1.0, 2.0], bumpy.F)
+    basis = stretchmap.homology_basis(other)
+    for call in (
+        lambda: stretchmap.harmonic_forms(bumpy, basis),
+        lambda: stretchmap.holomorphic_forms(bumpy, basis),
+        lambda: conformal_map(bumpy, basis=basis),
+        lambda: area_map(bumpy, basis=basis),
+        lambda: area_map(bumpy, conformal=conformal_map(other, basis=basis)),
+    ):
+        with pytest.raises(stretchmap.errors.KindError, match="of another surface"):
+            call()
+    solid = stretchmap.samples.solid_torus(600)
+    with pytest.raises(stretchmap.errors.KindError, match="of another surface"):
+        stretchmap.volume_map(solid, boundary_map=area_map(bumpy, finish="none"))
+
+
 def test_folds_are_refused_or_kept_on_request(bumpy: TriMesh) -> None:
     coarse = stretchmap.samples.torus_surface(3, 3, 1.05, 1.0)
     try:

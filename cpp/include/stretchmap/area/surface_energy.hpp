@@ -3,15 +3,17 @@
 //
 //   sum over faces |t| [ area   (rho + 1/rho - 2)         rho   = |g(t)| / (scale |t|)
 //                      + shape  ((s1/s2 + s2/s1)/2 - 1)   s     = singular values of the face's map
-//                      + chart  (sigma + 1/sigma - 2) ]   sigma = signed area in the (u, v) chart
+//                      + chart  (sigma + 1/sigma - 2)     sigma = signed area in the (u, v) chart
 //                                                         times the torus' density at its middle,
 //                                                         over |t|
+//                      + facing mean((x^2 + 1) / chi(x) - 2) ]
 //
-// The last term is infinite before any face can turn over in the chart. With `facing` it is joined
-// by the mean over the corners of sigma_k + 1/sigma_k - 2, sigma_k = component of g(t)'s area
-// vector along the torus' normal at corner k over |t|: infinite before the flat face turns inward
-// at a corner, which a coarse face can do while its chart area is positive. Areas of source and
-// torus are scaled to one.
+// x = how far the flat face looks outward over |t|, at its corners and where it does least (see
+// torus_graph.hpp), chi = (x + sqrt(x^2 + epsilon^2)) / 2. The chart term is infinite before a face
+// can turn over in the chart; so is the facing term, for epsilon = 0, before a face breaks the
+// certificate's condition, which a coarse one can do while its chart area is positive. With
+// epsilon > 0 it is finite there and draws such faces back. Areas of source and torus are scaled to
+// one.
 #pragma once
 
 #include "stretchmap/area/chart.hpp"
