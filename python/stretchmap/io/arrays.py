@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import as_reals, as_rows
 from ..errors import ArrayError, FileFormatError
+
+_log = logging.getLogger("stretchmap")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +105,40 @@ def checked_uv(
     if suffix != ".obj":
         raise FileFormatError(f"{suffix} files hold no texture coordinates; write an .obj")
     return as_reals(corner_uv, "corner_uv", (len(faces), 3, 2))
+
+
+def fans(corners: NDArray[Any], sizes: NDArray[Any]) -> NDArray[Any]:
+    """Triangles of polygons, each a fan from its first corner; says how many were split.
+
+    Parameters
+    ----------
+    corners : (c, ...) ndarray
+        Corners of all polygons, one after the other: vertex ids, or rows of several ids each.
+    sizes : (m,) ndarray of integers
+        Number of corners of each polygon.
+
+    Returns
+    -------
+    (t, 3, ...) ndarray
+        No corner is added; triangles of a polygon follow each other in its place.
+
+    Raises
+    ------
+    FileFormatError
+        A polygon of fewer than three corners.
+    """
+    if (sizes < 3).any():
+        raise FileFormatError(f"{int((sizes < 3).sum())} faces with fewer than three corners")
+    count = sizes - 2
+    polygon = np.repeat(np.arange(len(sizes)), count)
+    first = (np.cumsum(sizes) - sizes)[polygon]
+    step = np.arange(len(polygon)) - (np.cumsum(count) - count)[polygon]
+    n_split = int((sizes > 3).sum())
+    if n_split:
+        _log.warning(
+            "%d polygons were split into %d triangles", n_split, int(count[sizes > 3].sum())
+        )
+    return corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
 
 
 def triangles_only(sizes: NDArray[Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from typing import BinaryIO
 
@@ -9,28 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .arrays import MeshArrays
+from .arrays import MeshArrays, fans
+
+_log = logging.getLogger("stretchmap")
 
 _CORNER = rb"[ \t]+(-?\d+)(?:/(-?\d*))?(?:/-?\d*)?"
 _FACE = re.compile(rb"^[ \t]*f" + 3 * _CORNER + rb"[ \t]*(?:#.*)?\r?$", re.MULTILINE)
+_POLYGON = re.compile(rb"[ \t]*f(?:" + _CORNER + rb"){3,}[ \t]*(?:#.*)?\r?$")
 _FACE_LINE = re.compile(rb"^[ \t]*f[ \t].*$", re.MULTILINE)
 
 
 def read_obj(data: bytes) -> MeshArrays:
-    """Parse an OBJ file: ``v``, ``vt`` and triangular ``f`` lines; groups and the rest are skipped.
+    """Parse an OBJ file: ``v``, ``vt`` and ``f`` lines; groups and the rest are skipped.
 
-    Texture coordinates may differ at the corners that meet in a vertex (a seam).
+    Polygons become triangles. Texture coordinates may differ at the corners that meet in a vertex
+    (a seam); where an index of theirs points nowhere all are left out, which the log says.
     """
     data = re.sub(rb"\\\r?\n", b" ", data)
     points, last_point = _obj_table(data, b"v", 3)
     corners = _FACE.findall(data)
     lines = _FACE_LINE.findall(data)
-    if len(corners) != len(lines):
-        odd = next(line for line in lines if not _FACE.match(line))
-        raise FileFormatError(f"not a triangle: {odd.decode(errors='replace').strip()!r}")
-    if not corners or not len(points):
-        raise FileFormatError(f"{len(points)} vertices and {len(corners)} faces")
-    table = np.array(corners)
+    if not lines or not len(points):
+        raise FileFormatError(f"{len(points)} vertices and {len(lines)} faces")
+    table = np.array(corners) if len(corners) == len(lines) else _split_polygons(lines)
     first_face = _FACE_LINE.search(data).start()  # type: ignore[union-attr]
     in_order = last_point <= first_face
     faces = _obj_ids(table[:, 0::2], len(points), in_order)
@@ -39,9 +41,20 @@ def read_obj(data: bytes) -> MeshArrays:
         uv, last_uv = _obj_table(data, b"vt", 2)
         ids = _obj_ids(table[:, 1::2], len(uv), last_uv <= first_face)
         if ((ids < 0) | (ids >= len(uv))).any():
-            raise FileFormatError("texture indices point outside the vt lines")
-        corner_uv = uv[ids]
+            _log.warning("texture indices point outside the vt lines; texture left out")
+        else:
+            corner_uv = uv[ids]
     return MeshArrays(points, F=faces, corner_uv=corner_uv)
+
+
+def _split_polygons(lines: list[bytes]) -> NDArray[np.bytes_]:
+    """(t, 6) vertex and texture words of the corners of all triangles."""
+    odd = next((line for line in lines if not _POLYGON.match(line)), None)
+    if odd is not None:
+        raise FileFormatError(f"not a face: {odd.decode(errors='replace').strip()!r}")
+    rows = [re.findall(_CORNER, line.split(b"#")[0]) for line in lines]
+    words = np.array([corner for row in rows for corner in row])
+    return fans(words, np.array([len(row) for row in rows])).reshape(-1, 6)
 
 
 def _obj_table(data: bytes, key: bytes, width: int) -> tuple[NDArray[np.float64], int]:

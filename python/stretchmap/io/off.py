@@ -8,11 +8,11 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import FileFormatError
-from .arrays import MeshArrays, triangles_only
+from .arrays import MeshArrays, fans
 
 
 def read_off(data: bytes) -> MeshArrays:
-    """Parse an OFF file of triangles; normals and colors of the variants are skipped."""
+    """Parse an OFF file; polygons are split, normals and colors of the variants skipped."""
     text = re.sub(rb"#.*", b"", data)
     header = re.match(rb"\s*((?:ST)?C?N?)OFF\b", text)
     if not header:
@@ -28,8 +28,13 @@ def read_off(data: bytes) -> MeshArrays:
     points = np.loadtxt(lines[1 : 1 + n], usecols=(0, 1, 2), ndmin=2)
     faces = lines[1 + n : 1 + n + m]
     sizes = np.loadtxt(faces, usecols=0, dtype=np.int64, ndmin=1)
-    triangles_only(sizes)
-    return MeshArrays(points, F=np.loadtxt(faces, usecols=(1, 2, 3), dtype=np.int64, ndmin=2))
+    if (sizes == 3).all():
+        return MeshArrays(points, F=np.loadtxt(faces, usecols=(1, 2, 3), dtype=np.int64, ndmin=2))
+    rows = [line.split()[1 : 1 + size] for line, size in zip(faces, sizes, strict=True)]
+    if any(len(row) != size for row, size in zip(rows, sizes, strict=True)):
+        raise FileFormatError("a face has fewer corners than it announces")
+    corners = np.array([int(word) for row in rows for word in row], dtype=np.int64)
+    return MeshArrays(points, F=fans(corners, sizes))
 
 
 def write_off(file: BinaryIO, mesh: MeshArrays) -> None:

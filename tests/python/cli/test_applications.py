@@ -9,7 +9,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import samples
-from stretchmap.errors import FileFormatError, OptionError
+from stretchmap.errors import FileFormatError, KindError, OptionError
 from stretchmap.plot.morphing import morph
 
 RNG = np.random.default_rng(4)
@@ -69,7 +69,7 @@ def test_morph_files(bumpy_map, tmp_path):
         result.save(tmp_path / "m.mp4")
     with pytest.raises(OptionError):
         morph(bumpy_map, 1)
-    with pytest.raises(OptionError):
+    with pytest.raises(KindError, match="map of a solid"):
         morph(sm.area_map(bumpy_map.mesh.surface))
 
 

@@ -301,8 +301,8 @@ def test_defects_in_files_keep_their_own_error(tmp_path):
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n")
     with pytest.raises(IndexRangeError):
         read(path)
-    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 4 3\n")
-    with pytest.raises(FileFormatError, match="not a triangle: 'f 1 2 4 3'"):
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2\n")
+    with pytest.raises(FileFormatError, match="not a face: 'f 1 2'"):
         read(path)
 
 
