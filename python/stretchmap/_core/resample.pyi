@@ -1,10 +1,9 @@
 from __future__ import annotations
 import numpy
 import numpy.typing
-import stretchmap._core.registration
 import stretchmap._core.volume
 import typing
-__all__: list[str] = ['BoundaryFit', 'FitSamples', 'HexNewton', 'HexNewtonReport', 'HexReport', 'hex_volumes', 'jacobian_coefficients', 'relax_grid', 'scaled_jacobians', 'valid_hexes']
+__all__: list[str] = ['BoundaryFit', 'FitSamples', 'HexNewton', 'HexNewtonReport', 'HexReport', 'hex_volumes', 'jacobian_coefficients', 'scaled_jacobians', 'valid_hexes']
 class FitSamples:
     @property
     def distance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -67,8 +66,6 @@ def jacobian_coefficients(corners: typing.Annotated[numpy.typing.ArrayLike, nump
     """
     Of one hexahedron, for checks.
     """
-def relax_grid(corners: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], rest: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], corner_energy: stretchmap._core.volume.EnergyWeights, slack: typing.SupportsFloat | typing.SupportsIndex, power: typing.SupportsFloat | typing.SupportsIndex, home: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], home_y: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], pull: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], locator: stretchmap._core.registration.ChartLocator, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], slopes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], rim: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], sweeps: typing.SupportsInt | typing.SupportsIndex, y: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], reach: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], float, int]:
-    ...
 def scaled_jacobians(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], hexes: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 8]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 8]"]:
     ...
 def valid_hexes(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], hexes: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 8]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"]:

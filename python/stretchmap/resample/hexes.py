@@ -143,7 +143,6 @@ def _numbers(
     rings: int | None,
 ) -> tuple[int, int, int]:
     """The three numbers, those that are given and those to be chosen."""
-    given = [sections, block, rings]
     if sum((n_hexahedra is not None, target_size is not None)) > 1:
         raise OptionError("give n_hexahedra or target_size, not both")
     if target_size is not None:
@@ -155,11 +154,11 @@ def _numbers(
     while wanted > _COARSE * 8**levels:
         levels += 1
     chosen = tuple(2**levels * k for k in grid_numbers(ratio, wanted / 8**levels))
-    names, least = ("sections", "block", "rings"), (3, 1, 1)
-    for k in range(3):
-        value = chosen[k] if given[k] is None else given[k]
-        given[k] = whole(names[k], value, least[k], _MOST)
-    return given[0], given[1], given[2]
+    return (
+        whole("sections", chosen[0] if sections is None else sections, 3, _MOST),
+        whole("block", chosen[1] if block is None else block, 1, _MOST),
+        whole("rings", chosen[2] if rings is None else rings, 1, _MOST),
+    )
 
 
 def _optimized(

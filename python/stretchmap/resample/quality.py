@@ -39,7 +39,7 @@ def vertex_normals(surface: TriMesh) -> NDArray[np.float64]:
         angle = np.arctan2(sine, (first * second).sum(axis=1))
         for axis in range(3):
             total[:, axis] += np.bincount(F[:, k], angle * normals[:, axis], minlength=len(V))
-    return total / np.linalg.norm(total, axis=1, keepdims=True)
+    return np.asarray(total / np.linalg.norm(total, axis=1, keepdims=True))
 
 
 def boundary_quads(H: NDArray[np.int32]) -> NDArray[np.int32]:
