@@ -138,7 +138,8 @@ def fans(corners: NDArray[Any], sizes: NDArray[Any]) -> NDArray[Any]:
         _log.warning(
             "%d polygons were split into %d triangles", n_split, int(count[sizes > 3].sum())
         )
-    return corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    ids = np.stack([first, first + step + 1, first + step + 2], axis=1)
+    return np.asarray(corners[ids])
 
 
 def triangles_only(sizes: NDArray[Any]) -> None:

@@ -21,7 +21,7 @@ def read_stl(data: bytes) -> MeshArrays:
     elif data.lstrip()[:5].lower() == b"solid":
         if b"endsolid" not in data:
             raise FileFormatError("endsolid is missing, the file is cut off")
-        lines = re.findall(rb"^\s*vertex\s+(.*)$", data, re.MULTILINE)
+        lines = re.findall(rb"^[ \t]*vertex[ \t]+(.*)$", data, re.MULTILINE)
         corners = np.array([line.split() for line in lines]).astype(np.float64)
     else:
         raise FileFormatError(

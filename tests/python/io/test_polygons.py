@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 
 import numpy as np
 import pytest
@@ -79,3 +80,13 @@ def test_triangles_are_read_as_before(tmp_path, caplog):
     with caplog.at_level(logging.WARNING, logger="stretchmap"):
         np.testing.assert_array_equal(read(path).F, faces)
     assert not caplog.text
+
+
+def test_a_text_stl_of_blank_lines_is_read_at_once(tmp_path):
+    """200 kB of blank lines took minutes while the pattern could begin at each of them."""
+    path = tmp_path / "t.stl"
+    path.write_text("solid t\n" + "\n" * 200_000 + "endsolid t\n")
+    before = time.process_time()
+    with pytest.raises(FileFormatError):
+        read(path)
+    assert time.process_time() - before < 2.0
