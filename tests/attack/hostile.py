@@ -153,6 +153,7 @@ HOSTILE: dict[str, dict[str, Callable[[], Any]]] = {
     "fractions": _ANY | _FRACTIONS | _NONE,
     "pair": _ANY | _PAIR,
 }
+HOSTILE["steps"] = {name: make for name, make in HOSTILE["whole"].items() if name != "10^9"}
 HOSTILE["gaps"] = {name: make for name, make in HOSTILE["numbers"].items() if name != "nan"}
 del HOSTILE["flag"]["true"]
 del HOSTILE["progress"]["class"]  # it can be called

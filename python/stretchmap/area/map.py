@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
+from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import Torus
@@ -20,15 +21,15 @@ from ..certificate.checks import certify
 from ..certificate.findings import Certificate
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import CertificationError, OptionError
+from ..homology.basis import HomologyBasis
 from ..maps.result import MapResult
-from ..mesh.given import require_same_mesh
+from ..mesh.given import as_surface, require_same_mesh
 from .balance import JAMMED, balance_areas
 from .finish import finish_areas, unfold_faces
 from .search import Ratio, search_phase
 from .sem import minimize_stretch, start_angles, unfolded_turns
 
 if TYPE_CHECKING:
-    from ..homology.basis import HomologyBasis
     from ..mesh.meshes import TriMesh
 
 __all__ = ["AreaMap", "Finish", "area_map"]
@@ -39,6 +40,8 @@ _log = logging.getLogger("stretchmap")
 
 # Source triangles longer than this are not asked to keep their shape.
 _MAX_ASPECT = 10.0
+
+_MOST_TURNS = 1e3  # a phase may have
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -110,6 +113,7 @@ class AreaMap(MapResult):
         OptionError
             If the torus has another ratio of radii: the map would not preserve areas there.
         """
+        instance("torus", torus, Torus, "Torus(R, r)")
         if not math.isclose(torus.ratio, self.ratio, rel_tol=1e-9):
             raise OptionError(f"the map is for R / r = {self.ratio}, the torus has {torus.ratio}")
         return torus.xi(self.angles[:, 0], self.angles[:, 1])
@@ -200,8 +204,15 @@ def area_map(
     area ratio in space, Q = (s1/s2 + s2/s1)/2 - 1 its angle distortion, sigma its area ratio in the
     chart, which is infinite before a face turns over. The weight grows from step to step.
     """
+    surface = as_surface(surface)
     _check_options(torus, phase, ratio, finish)
     _check_numbers(max_iter, tol, shape_budget, sem_iter)
+    keep_best = flag("keep_best", keep_best)
+    callback("progress", progress)
+    if basis is not None:
+        instance("basis", basis, HomologyBasis, "see homology_basis")
+    if conformal is not None:
+        instance("conformal", conformal, ConformalMap, "see conformal_map")
     clock = time.perf_counter()
     seconds: dict[str, float] = {}
     if conformal is None:
@@ -272,27 +283,24 @@ def area_map(
 def _check_options(
     torus: Torus | None, phase: float | None, ratio: str | float, finish: str
 ) -> None:
-    if phase is not None and not math.isfinite(phase):
-        raise OptionError(f"phase must be finite, got {phase}")
-    if torus is not None and ratio != "conformal":
-        raise OptionError("give the torus or the ratio of its radii, not both")
+    if phase is not None:
+        real("phase", phase, -_MOST_TURNS, _MOST_TURNS)
     if isinstance(ratio, str):
-        if ratio not in ("conformal", "search"):
-            raise OptionError(f"ratio must be 'conformal', 'search' or a number, got {ratio!r}")
-    elif not (math.isfinite(ratio) and ratio > 1.0):
-        raise OptionError(f"ratio R / r must be above 1 and finite, got {ratio}")
-    if finish not in ("ring", "face", "none"):
-        raise OptionError(f"finish must be 'ring', 'face' or 'none', got {finish!r}")
+        one_of("ratio", ratio, ("conformal", "search"))
+    else:
+        real("ratio", ratio, above=1.0)
+    if torus is not None:
+        instance("torus", torus, Torus, "Torus(R, r)")
+        if ratio != "conformal":
+            raise OptionError("give the torus or the ratio of its radii, not both")
+    one_of("finish", finish, ("ring", "face", "none"))
 
 
 def _check_numbers(max_iter: int, tol: float, shape_budget: float, sem_iter: int) -> None:
-    if not (math.isfinite(tol) and tol > 0.0):
-        raise OptionError(f"tol must be positive, got {tol}")
-    if not shape_budget >= 1.0:
-        raise OptionError(f"shape_budget must be at least 1, got {shape_budget}")
-    for name, value in (("max_iter", max_iter), ("sem_iter", sem_iter)):
-        if value < 0:
-            raise OptionError(f"{name} must not be negative, got {value}")
+    real("tol", tol, above=0.0)
+    real("shape_budget", shape_budget, 1.0)
+    whole("max_iter", max_iter, 0)
+    whole("sem_iter", sem_iter, 0)
 
 
 def _lap(seconds: dict[str, float], stage: str, start: float) -> float:

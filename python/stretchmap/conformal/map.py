@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
+from ..base.options import callback, one_of
 from ..base.progress import Progress, report
 from ..base.threads import takes_threads
 from ..base.torus import Torus
-from ..errors import OptionError
 from ..forms.harmonic import WEIGHTS, HarmonicForms, Weights
 from ..homology.basis import HomologyBasis, homology_basis
-from ..homology.representatives import harmonic_forms
+from ..homology.representatives import harmonic_forms, require_basis_of
 from ..maps.result import MapResult
+from ..mesh.given import as_surface
 from ..mesh.meshes import TriMesh
 from .hodge import lattice_basis
 from .torus import conformal_torus, tube_angle
@@ -164,11 +165,13 @@ def conformal_map(
     >>> round(result.aspect, 2), round(result.torus.ratio, 2)
     (1.74, 2.0)
     """
-    if weights not in ("auto", *WEIGHTS):
-        raise OptionError(f"weights must be auto or one of {', '.join(WEIGHTS)}, not {weights!r}")
+    surface = as_surface(surface)
+    one_of("weights", weights, ("auto", *WEIGHTS))
+    callback("progress", progress)
     start = perf_counter()
     if basis is None:
         basis = homology_basis(surface)
+    require_basis_of(surface, basis)
     basis.require_torus()
     middle = perf_counter()
     choices = WEIGHTS if weights == "auto" else (weights,)

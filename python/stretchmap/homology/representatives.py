@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from .. import _core
 from ..base.arrays import read_only
-from ..forms.harmonic import HarmonicForms, Weights, solve_harmonic
+from ..base.options import instance, one_of
+from ..forms.harmonic import WEIGHTS, HarmonicForms, Weights, solve_harmonic
 from ..forms.holomorphic import HolomorphicForms
-from ..mesh.given import require_same_mesh
+from ..mesh.given import as_surface, require_same_mesh
+from ..mesh.meshes import TriMesh
+from .basis import HomologyBasis, homology_basis
 
-if TYPE_CHECKING:
-    from ..homology.basis import HomologyBasis
-    from ..mesh.meshes import TriMesh
-
-__all__ = ["harmonic_forms", "holomorphic_forms"]
+__all__ = ["harmonic_forms", "holomorphic_forms", "require_basis_of"]
 
 _REMEDY = "pass homology_basis(surface), or leave it out"
+
+
+def require_basis_of(surface: TriMesh, basis: HomologyBasis) -> None:
+    """Raise unless the basis is one of this surface.
+
+    Raises
+    ------
+    OptionError
+        It is no basis.
+    KindError
+        It is one of another surface.
+    """
+    instance("basis", basis, HomologyBasis, "see homology_basis")
+    require_same_mesh(surface, basis.surface, "the basis is of another surface", _REMEDY)
 
 
 def harmonic_forms(
@@ -44,9 +55,7 @@ def harmonic_forms(
     Raises
     ------
     MeshError
-        As `homology_basis`.
-    KindError
-        The basis is of another surface.
+        As `homology_basis`; the basis is of another surface.
     OptionError
         Unknown weights.
     SolverError
@@ -62,11 +71,11 @@ def harmonic_forms(
     >>> found.weights, found.gram.shape
     ('intrinsic_delaunay', (2, 2))
     """
+    surface = as_surface(surface)
+    one_of("weights", weights, WEIGHTS)
     if basis is None:
-        from ..homology.basis import homology_basis
-
         basis = homology_basis(surface)
-    require_same_mesh(surface, basis.surface, "the basis is of another surface", _REMEDY)
+    require_basis_of(surface, basis)
     if weights == basis.harmonic.weights:
         return basis.harmonic
     return solve_harmonic(surface, basis.dual_forms, weights)
@@ -99,6 +108,7 @@ def holomorphic_forms(surface: TriMesh, basis: HomologyBasis | None = None) -> H
     >>> found.wedge.round().astype(int).shape
     (4, 4)
     """
+    surface = as_surface(surface)
     real = harmonic_forms(surface, basis).forms
     star, wedge = _core.forms.hodge_products(surface.topology, surface.V, real)
     coefficients = np.linalg.solve(wedge, star).T if len(real) else np.zeros((0, 0))

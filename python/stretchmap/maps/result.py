@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import io
 from ..base.arrays import read_only
 from ..base.files import atomic_path
-from ..base.options import as_path
+from ..base.options import as_path, flag, whole
 from ..base.tables import HasSummary, plain_dict, table, versions
 from ..base.torus import TWO_PI, Torus
 from ..errors import OptionError
@@ -217,6 +217,7 @@ class MapResult(HasSummary, Exchanged):
         history : bool
             Add the list of iteration records.
         """
+        history = flag("history", history)
         d = self.distortion
         out: dict[str, Any] = {
             "kind": self.title,
@@ -250,6 +251,8 @@ class MapResult(HasSummary, Exchanged):
 
     def to_json(self, history: bool = False, indent: int | None = 2) -> str:
         """:meth:`to_dict` as JSON text; what is not finite becomes ``null``."""
+        if indent is not None:
+            indent = whole("indent", indent, 0, 100)
         return json.dumps(self.to_dict(history), indent=indent, allow_nan=False)
 
     def summary(self) -> str:

@@ -332,7 +332,7 @@ def test_other_genera_are_refused():
             conformal_map(surface)
         with pytest.raises(GenusError):
             hodge_lattice(surface)
-    with pytest.raises(OptionError, match="weights must be auto"):
+    with pytest.raises(OptionError, match="weights must be 'auto'"):
         conformal_map(TriMesh(*shapes.torus()), weights="mean value")
 
 

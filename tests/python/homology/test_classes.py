@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import stretchmap as sm
 from stretchmap import TetMesh, homology_basis, samples
-from stretchmap.errors import ArrayError, IndexRangeError, KindError
+from stretchmap.errors import ArrayError, IndexRangeError, KindError, OptionError
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +71,16 @@ def test_the_solid_has_to_be_that_of_the_surface():
         homology_basis(solid)
     with pytest.raises(KindError, match="a TetMesh is needed"):
         homology_basis(solid.surface, solid.surface)
+
+
+def test_a_basis_or_conformal_map_of_another_surface_is_refused():
+    surface = samples.torus_surface(12, 8)
+    other = samples.torus_surface(12, 8, R=4.0)
+    basis = homology_basis(other)
+    for use in (sm.harmonic_forms, sm.holomorphic_forms, sm.conformal_map, sm.area_map):
+        with pytest.raises(KindError, match="basis is of another surface: 96 rows of V differ"):
+            use(surface, basis=basis)
+        with pytest.raises(OptionError, match="basis must be a HomologyBasis"):
+            use(surface, basis=surface)
+    with pytest.raises(KindError, match="conformal map is of another surface"):
+        sm.area_map(surface, conformal=sm.conformal_map(other))
