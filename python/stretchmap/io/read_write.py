@@ -136,6 +136,15 @@ def read_surface(
 ) -> TriMesh:
     """Read a triangle mesh: `read`, where nothing else will do.
 
+    Parameters
+    ----------
+    path, orient, compact
+        As `read`.
+
+    Returns
+    -------
+    TriMesh
+
     Raises
     ------
     KindError
@@ -161,6 +170,15 @@ def read_solid(
     path: str | os.PathLike[str], *, orient: bool = False, compact: bool = False
 ) -> TetMesh:
     """Read a tet mesh: `read`, where nothing else will do.
+
+    Parameters
+    ----------
+    path, orient, compact
+        As `read`.
+
+    Returns
+    -------
+    TetMesh
 
     Raises
     ------

@@ -62,6 +62,16 @@ def kinds(result: MapResult) -> tuple[Kind, ...]:
     Parameters
     ----------
     result : MapResult
+
+    Returns
+    -------
+    tuple of str
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> sm.plot.kinds(sm.conformal_map(sm.samples.torus_surface(24, 12)))
+    ('checkerboard', 'loops', 'domain', 'ratios')
     """
     result = as_map(result)
     solid, torus = isinstance(result.mesh, TetMesh), result.torus is not None
@@ -86,6 +96,17 @@ def picture(result: MapResult, kind: Kind, **options: Any) -> Figure:
         A key of ``KINDS``; `kinds` names those the map has data for.
     **options
         Those of the function of that name.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> result = sm.conformal_map(sm.samples.torus_surface(24, 12))
+    >>> len(sm.plot.picture(result, "checkerboard", cells=(12, 6)).axes)
+    2
 
     Raises
     ------
@@ -120,6 +141,16 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> No
         Another suffix.
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.loops(sm.samples.torus_surface(24, 12))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sm.plot.save(figure, os.path.join(folder, "loops.png"))
+    ...     os.listdir(folder)
+    ['loops.png']
     """
     from ..base.files import atomic_path
 

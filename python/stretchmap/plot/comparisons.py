@@ -35,6 +35,14 @@ def comparison(found: Comparison) -> Figure:
     ------
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> found = sm.compare(solid, {"as it is": solid.V, "mapped": sm.volume_map(solid)})
+    >>> len(sm.plot.comparison(found).axes)
+    2
     """
     instance("found", found, Comparison, "see stretchmap.compare")
     names = list(found.distortion)

@@ -54,6 +54,14 @@ class Morph(HasSummary):
         not: nothing protects a linear homotopy.
     fields : Cells
         The source with the fields of the map, which every frame of a ``.pvd`` carries.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> way = sm.morph(sm.volume_map(solid), frames=5)
+    >>> bool((way.frame(0) == solid.V).all()), way.times.tolist()
+    (True, [0.0, 0.25, 0.5, 0.75, 1.0])
     """
 
     solid: TetMesh
@@ -174,6 +182,13 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
         Too few or too many frames, or an image that is a single point.
     KindError
         It is no map, or the map of a surface.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> way = sm.morph(sm.volume_map(sm.samples.bumpy_torus(1000)), frames=3)
+    >>> way.flips.shape
+    (3,)
     """
     result, solid = as_map_of_solid(result, "a morph")
     frames, align = whole("frames", frames, 2, _MOST_FRAMES), flag("align", align)

@@ -34,6 +34,13 @@ class View:
         Degrees above the xy-plane and around the z-axis.
     frame : (3, 3) ndarray, optional
         Rotation whose rows are to be taken for the directions x, y and z.
+
+    Examples
+    --------
+    >>> from stretchmap.plot.painting import View
+    >>> right, up, towards = View(elevation=90.0, azimuth=-90.0).axes  # from above
+    >>> right.round(12).tolist()
+    [1.0, 0.0, 0.0]
     """
 
     elevation: float = 35.0
@@ -61,7 +68,18 @@ class View:
 
 @dataclass
 class Scene:
-    """Triangles and lines that hide each other; collected first, drawn at once."""
+    """Triangles and lines that hide each other; collected first, drawn at once.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.plot.painting import Scene, View
+    >>> from stretchmap.plot.style import empty_figure, steps
+    >>> surface = sm.samples.torus_surface(24, 12)
+    >>> scene = Scene(View())
+    >>> scene.add_faces(surface.V[surface.F], steps(surface.n_faces))
+    >>> scene.draw(empty_figure(4.0, 3.0).add_subplot())
+    """
 
     view: View
     _polygons: list[Array] = field(default_factory=list)
@@ -182,6 +200,13 @@ def subdivided(corners: Array, pieces: int) -> Array:
     -------
     (m * pieces**2, 3, d) ndarray
         The pieces of a triangle follow each other.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stretchmap.plot.painting import subdivided
+    >>> subdivided(np.eye(3)[None], 2).shape
+    (4, 3, 3)
     """
     k = pieces
     up = [((i, j), (i + 1, j), (i, j + 1)) for i in range(k) for j in range(k - i)]

@@ -47,6 +47,13 @@ def registration(result: MapResult) -> Figure:
         The landmarks are not vertices of the two boundaries.
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> result = sm.register(sm.samples.solid_torus(600), sm.samples.bumpy_torus(1000))
+    >>> [axes.get_title() for axes in sm.plot.registration(result).axes][:2]
+    ['source, seen from one side', 'target, seen from one side']
     """
     result = as_map(result)
     solid, target = result.mesh, result.target

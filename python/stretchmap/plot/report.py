@@ -86,6 +86,18 @@ def write_report(result: MapResult, path: str | os.PathLike[str], source: str = 
         matplotlib is not installed.
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import stretchmap as sm
+    >>> from stretchmap.plot.report import write_report
+    >>> result = sm.conformal_map(sm.samples.torus_surface(24, 12))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "page.html")
+    ...     write_report(result, path, source="a torus")
+    ...     os.path.getsize(path) > 1000
+    True
     """
     result, path = as_map(result), as_path(path)
     text = _page(result, source)

@@ -57,6 +57,13 @@ def cut(
         Another color.
     MissingDependencyError
         PyVista is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.plot import scene
+    >>> plotter = scene.cut(sm.volume_map(sm.samples.solid_torus(600)))  # doctest: +SKIP
+    >>> plotter.show()  # doctest: +SKIP
     """
     result, solid = as_map_of_solid(result, "a cut")
     one_of("color", color, tuple(_COLORS))
@@ -97,6 +104,12 @@ def loops(mesh: TriMesh | TetMesh, *, off_screen: bool = True) -> pyvista.Plotte
         As `homology_basis`.
     MissingDependencyError
         PyVista is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.plot import scene
+    >>> scene.loops(sm.samples.double_torus()).show()  # doctest: +SKIP
     """
     from ..homology.basis import homology_basis
 
@@ -135,6 +148,12 @@ def save(plotter: pyvista.Plotter, path: str | os.PathLike[str]) -> None:
         Another suffix.
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.plot import scene
+    >>> scene.save(scene.loops(sm.samples.double_torus()), "loops.png")  # doctest: +SKIP
     """
     path = as_path(path)
     if path.suffix.lower() != ".png":

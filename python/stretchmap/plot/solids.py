@@ -57,6 +57,13 @@ def cutaway(result: MapResult, color: Color = "coordinate", opening: float = 0.3
         An option out of range.
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.cutaway(sm.volume_map(sm.samples.solid_torus(600)), color="ratio")
+    >>> figure.axes[0].get_title()
+    'source'
     """
     result, _ = as_map_of_solid(result, "a cut-away")
     one_of("color", color, ("coordinate", "ratio"))
@@ -119,6 +126,13 @@ def levels(
         An option out of range, or the map has no torus.
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.levels(sm.volume_map(sm.samples.solid_torus(600)), 3)
+    >>> len(figure.legends[0].get_texts())
+    3
     """
     one_of("by", by, ("s", "u", "v"))
     opening = real("opening", opening, 0.0, below=1.0)

@@ -37,6 +37,13 @@ def ratios(result: MapResult) -> Figure:
     ------
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.ratios(sm.area_map(sm.samples.torus_surface(24, 12)))
+    >>> figure.axes[0].get_ylabel()
+    'faces per bin (%)'
     """
     result = as_map(result)
     figure = empty_figure(7.0, 4.2)
@@ -83,6 +90,13 @@ def convergence(result: MapResult) -> Figure:
         The map has no history, as one that is solved for at once or comes from elsewhere.
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.convergence(sm.area_map(sm.samples.torus_surface(24, 12)))
+    >>> len(figure.axes)
+    3
     """
     history = as_map(result).history
     if not history:

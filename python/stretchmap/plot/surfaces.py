@@ -55,6 +55,13 @@ def domain(result: MapResult) -> Figure:
         The map names no torus.
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.domain(sm.area_map(sm.samples.torus_surface(24, 12)))
+    >>> figure.axes[0].get_xlabel()
+    'u, around the axis (turns)'
     """
     result = as_map(result)
     figure = empty_figure(7.6, 4.6)
@@ -116,6 +123,13 @@ def checkerboard(result: MapResult, cells: tuple[int, int] = (24, 8)) -> Figure:
         The map names no torus, or the numbers are not positive and even.
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.checkerboard(sm.area_map(sm.samples.torus_surface(24, 12)))
+    >>> [axes.get_title() for axes in figure.axes][1]
+    'image on the torus'
     """
     result = as_map(result)
     cells = pair("cells", cells, 2, _MOST_CELLS)
@@ -161,6 +175,13 @@ def loops(result: MapResult | TriMesh | TetMesh) -> Figure:
         As `homology_basis`.
     MissingDependencyError
         matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> figure = sm.plot.loops(sm.samples.double_torus(1))
+    >>> [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    ['handle loop, bounds inside', 'tunnel loop, bounds outside']
     """
     mesh = as_mesh(result.mesh if isinstance(result, MapResult) else result, "result")
     figure = empty_figure(6.4, 4.8)

@@ -44,6 +44,13 @@ class HandleCut:
         The same over the square root of the area of the surface.
     center : tuple of three floats
         Where it was.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> done = sm.prepare(sm.samples.double_torus(6), faces=1_000, max_cut=0.7)
+    >>> [cut.length > 0.0 for cut in done.cuts]
+    [True]
     """
 
     kind: Literal["handle", "tunnel"]

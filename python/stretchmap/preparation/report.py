@@ -51,6 +51,13 @@ class Preparation(HasSummary):
     cuts : tuple of HandleCut
         Every surplus handle that was removed, with its length and place.
     steps : tuple of Step
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> done = sm.prepare(sm.samples.torus_surface(24, 12), faces=1_000)
+    >>> done.solid.surface.genus, done.cuts
+    (1, ())
     """
 
     solid: TetMesh

@@ -32,6 +32,15 @@ class Landmarks:
         Vertices of the two solids.
     snapped : ndarray, shape (k, 2)
         How far the points given were from these vertices, in source and target; zero for ids.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> source, target = sm.samples.solid_torus(600), sm.samples.solid_torus(800)
+    >>> ends = source.V[source.boundary_vertices[:2]], target.V[target.boundary_vertices[:2]]
+    >>> marks = sm.Landmarks.of(source, target, *ends)
+    >>> len(marks), float(marks.snapped.max())
+    (2, 0.0)
     """
 
     source: NDArray[np.int32]
@@ -147,6 +156,10 @@ def read_landmarks(
     within : float
         As `Landmarks.of`.
 
+    Returns
+    -------
+    Landmarks
+
     Raises
     ------
     FileFormatError
@@ -155,6 +168,19 @@ def read_landmarks(
         As `Landmarks.of`.
     OSError
         If the file cannot be opened.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.solid_torus(600)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "landmarks.csv")
+    ...     np.savetxt(path, [solid.boundary_vertices[[0, 1]]], fmt="%d", delimiter=",")
+    ...     marks = sm.read_landmarks(path, solid, solid)
+    >>> marks.source.tolist() == [solid.boundary_vertices[0]]
+    True
     """
     source, target = as_solid(source, "source"), as_solid(target, "target")
     within = real("within", within, above=0.0)

@@ -35,12 +35,24 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     n : int
         Number of landmarks.
 
+    Returns
+    -------
+    Landmarks
+
     Raises
     ------
     OptionError
         If ``n`` is not positive.
     LandmarkError
         If the rule finds fewer.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.registration.suggest import landmarks_between
+    >>> one, other = (sm.samples.vertebra_like(2000, seed=seed) for seed in (0, 1))
+    >>> len(landmarks_between(sm.register(one, other), n=4))
+    4
     """
     if n < 1:
         raise OptionError(f"n must be positive, got {n}")

@@ -63,6 +63,16 @@ def transfer(
         If it is no map of a solid.
     DegenerateError
         If a tet of source or target has no positive volume; ``ids`` are the tets.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> result = sm.register(sm.samples.solid_torus(600), sm.samples.bumpy_torus(1000))
+    >>> source, target = result.mesh, result.target
+    >>> mass = sm.transfer(result, np.full(source.n_tets, 2.0), per="tet")  # a density
+    >>> bool(np.isclose(mass @ target.tet_volumes, 2.0 * source.volume))
+    True
     """
     registration, solid = as_map_of_solid(registration, "carrying a field")
     target = registration.target

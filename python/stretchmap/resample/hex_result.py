@@ -64,6 +64,14 @@ class HexMesh(HasSummary, Exchanged):
     ----------
     .. [1] A. Johnen, J.-C. Weill, J.-F. Remacle, "Robust and efficient validation of the linear
        hexahedral element", Procedia Engineering 203 (2017), arXiv 1706.01613.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> result = sm.volume_map(sm.samples.solid_torus(600))
+    >>> grid = sm.hex_mesh(result, sections=12, block=2, rings=1)
+    >>> grid.H.shape[0] == len(grid.scaled_jacobians) == 144
+    True
     """
 
     V: NDArray[np.float64]

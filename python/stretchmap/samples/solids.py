@@ -170,6 +170,11 @@ def knot_tube(n_tets: int = 20_000, radius: float = 0.4, p: int = 2, q: int = 3)
 def ball(n: int = 6) -> TetMesh:
     """A ball of radius 1 (genus 0), from a cube of ``(2 n)^3`` cells.
 
+    Parameters
+    ----------
+    n : int
+        Half the number of cells along an edge of the cube, at least 1.
+
     Returns
     -------
     TetMesh

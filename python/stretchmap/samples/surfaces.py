@@ -56,6 +56,11 @@ def torus_surface(nu: int = 60, nv: int = 20, R: float = 3.0, r: float = 1.0) ->
 def sphere(n: int = 6) -> TriMesh:
     """The unit sphere, ``48 n^2`` faces; the boundary of :func:`ball`.
 
+    Parameters
+    ----------
+    n : int
+        As of :func:`ball`.
+
     Returns
     -------
     TriMesh
@@ -76,6 +81,11 @@ def sphere(n: int = 6) -> TriMesh:
 
 def double_torus(n: int = 2) -> TriMesh:
     """A closed surface of genus 2, the boundary of :func:`solid_double_torus`.
+
+    Parameters
+    ----------
+    n : int
+        As of :func:`solid_double_torus`.
 
     Returns
     -------

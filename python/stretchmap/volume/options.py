@@ -42,6 +42,13 @@ class FlipFreeOptions:
         Most steps in a row that share one Hessian; 1 renews it at every step.
     cg_tol, max_cg
         Relative residual and most iterations of the linear solves.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> options = sm.FlipFreeOptions(glide_iter=5)
+    >>> sm.volume_map(sm.samples.solid_torus(600), options=options).distortion.flips
+    0
     """
 
     volume_weight: float = 1e4

@@ -11,7 +11,7 @@ import pytest
 
 import stretchmap
 
-OPTIONAL = {"plot": "matplotlib", "cli": "typer"}
+OPTIONAL = {"plot": ("matplotlib",), "cli": ("typer",), "preparation": ("gpytoolbox", "tetgen")}
 
 
 def modules() -> list[str]:
@@ -20,9 +20,10 @@ def modules() -> list[str]:
 
 
 def load(name: str) -> ModuleType:
-    for room, package in OPTIONAL.items():
+    for room, packages in OPTIONAL.items():
         if name.startswith(f"stretchmap.{room}"):
-            pytest.importorskip(package)
+            for package in packages:
+                pytest.importorskip(package)
     return importlib.import_module(name)
 
 
