@@ -21,12 +21,22 @@ def from_pyvista(data: Any) -> TriMesh | TetMesh:
     data : pyvista.PolyData or pyvista.UnstructuredGrid
         Of triangles, or of tets with or without triangles. Row i of ``V`` is its point i.
 
+    Returns
+    -------
+    TriMesh or TetMesh
+
     Raises
     ------
     KindError
         It is another object, or holds other cells.
     MeshError
         The arrays are not a mesh.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> import pyvista  # doctest: +SKIP
+    >>> sm.from_pyvista(pyvista.ParametricTorus())  # doctest: +SKIP
     """
     if not _is_of(data, "pyvista"):
         raise KindError(f"a PolyData or UnstructuredGrid is needed, got {type(data).__name__}")
@@ -41,14 +51,54 @@ def from_pyvista(data: Any) -> TriMesh | TetMesh:
 
 
 def from_trimesh(data: Any) -> TriMesh:
-    """A surface from ``trimesh.Trimesh``; raises as `from_pyvista`."""
+    """A surface from ``trimesh.Trimesh``.
+
+    Parameters
+    ----------
+    data : trimesh.Trimesh
+
+    Returns
+    -------
+    TriMesh
+
+    Raises
+    ------
+    KindError, MeshError
+        As `from_pyvista`.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> import trimesh  # doctest: +SKIP
+    >>> sm.from_trimesh(trimesh.creation.torus(3.0, 1.0))  # doctest: +SKIP
+    """
     if not _is_of(data, "trimesh") or not hasattr(data, "faces"):
         raise KindError(f"a trimesh.Trimesh is needed, got {type(data).__name__}")
     return TriMesh(np.asarray(data.vertices), np.asarray(data.faces))
 
 
 def from_meshio(data: Any) -> TriMesh | TetMesh:
-    """A solid from ``meshio.Mesh`` where it holds tets, else a surface; as `from_pyvista`."""
+    """A solid from ``meshio.Mesh`` where it holds tets, else a surface.
+
+    Parameters
+    ----------
+    data : meshio.Mesh
+
+    Returns
+    -------
+    TriMesh or TetMesh
+
+    Raises
+    ------
+    KindError, MeshError
+        As `from_pyvista`.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> import meshio  # doctest: +SKIP
+    >>> sm.from_meshio(meshio.read("part.msh"))  # doctest: +SKIP
+    """
     if not _is_of(data, "meshio") or not hasattr(data, "cells"):
         raise KindError(f"a meshio.Mesh is needed, got {type(data).__name__}")
     blocks: dict[str, list[NDArray[Any]]] = {}
