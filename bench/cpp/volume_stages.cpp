@@ -145,7 +145,7 @@ void newton_stages(const SolidTorus& solid, const Problem& p, const Settings& se
       row_name("newton.setup", solid, settings),
       [&] {
         newton = std::make_unique<volume::SolidNewton>(volume::SolidEnergy(
-            solid.tets, volume::rest_matrices(p.V, solid.tets, 6.0), p.rest, p.fixed, p.R, p.r, x));
+            {solid.tets, volume::rest_matrices(p.V, solid.tets, 6.0), p.rest, p.fixed}, x));
       },
       0.0, 1);
   row.counters = {{"rows", newton->energy().rows()}};

@@ -186,7 +186,8 @@ void bind_volume(py::module_& m) {
       "face_energy",
       [](const PointsRef& x, const FacesRef& faces, const RowsRef& rest, double R, double r,
          double epsilon) {
-        const volume::BoundaryBarrier barrier(faces, rest, Vec::Ones(faces.rows()), R, r);
+        const volume::BoundaryBarrier barrier(
+            {std::make_shared<volume::TorusSurface>(R, r), faces, rest, Vec::Ones(faces.rows())});
         Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
         Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
         barrier.linearise(x, 0, epsilon, gradient, hessian);

@@ -1,3 +1,6 @@
+#include <limits>
+#include <optional>
+
 #include "arrays.hpp"
 #include "stretchmap/volume/level_histogram.hpp"
 #include "stretchmap/volume/rest_shape.hpp"
@@ -68,19 +71,39 @@ void bind_newton(py::module_& m) {
       .def_readonly("alpha", &NewtonReport::alpha)
       .def_readonly("cg_iterations", &NewtonReport::cg_iterations)
       .def_readonly("negative_curvature", &NewtonReport::negative_curvature)
-      .def_readonly("cg_residual", &NewtonReport::cg_residual);
+      .def_readonly("cg_residual", &NewtonReport::cg_residual)
+      .def_readonly("shift", &NewtonReport::shift);
+  py::class_<GlideSurface, std::shared_ptr<GlideSurface>>(m, "GlideSurface")
+      .def_property_readonly("area", &GlideSurface::area);
+  py::class_<TorusSurface, GlideSurface, std::shared_ptr<TorusSurface>>(m, "TorusSurface")
+      .def(py::init<double, double>(), py::arg("R"), py::arg("r"));
+  py::class_<GlidingBoundary>(m, "GlidingBoundary")
+      .def(py::init([](std::shared_ptr<GlideSurface> surface, Faces faces, Rows rest, Vec weights) {
+             return GlidingBoundary{std::move(surface), std::move(faces), std::move(rest),
+                                    std::move(weights)};
+           }),
+           py::kw_only(), py::arg("surface"), py::arg("faces"), py::arg("rest"),
+           py::arg("weights"));
+  py::class_<NewtonOptions>(m, "NewtonOptions")
+      .def(py::init([](double tol, int max_cg, bool keep_hessian) {
+             NewtonOptions options;
+             options.tol = tol;
+             options.max_cg = max_cg;
+             options.keep_hessian = keep_hessian;
+             return options;
+           }),
+           py::kw_only(), py::arg("tol") = NewtonOptions().tol,
+           py::arg("max_cg") = NewtonOptions().max_cg, py::arg("keep_hessian") = false);
   py::class_<SolidNewton>(m, "SolidNewton")
-      .def(
-          py::init([](const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
-                      const FlagsRef& motion, double R, double r, const PointsRef& x,
-                      const FacesRef& faces, const RowsRef& face_rest, const VecRef& face_weights) {
-            return SolidNewton(SolidEnergy(tets, rest, weights, motion, R, r, x,
-                                           BoundaryBarrier(faces, face_rest, face_weights, R, r)));
-          }),
-          py::arg("tets").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
-          py::arg("motion").noconvert(), py::arg("R"), py::arg("r"), py::arg("x").noconvert(),
-          py::arg("faces").noconvert(), py::arg("face_rest").noconvert(),
-          py::arg("face_weights").noconvert(), release_gil())
+      .def(py::init([](const PointsRef& x, const TetsRef& tets, const RowsRef& rest,
+                       const VecRef& weights, const FlagsRef& motion,
+                       const std::optional<GlidingBoundary>& boundary) {
+             return SolidNewton(SolidEnergy({tets, rest, weights, motion}, x,
+                                            boundary.value_or(GlidingBoundary{})));
+           }),
+           py::arg("x").noconvert(), py::kw_only(), py::arg("tets").noconvert(),
+           py::arg("rest").noconvert(), py::arg("weights").noconvert(),
+           py::arg("motion").noconvert(), py::arg("boundary") = std::nullopt, release_gil())
       .def(
           "value",
           [](const SolidNewton& self, const PointsRef& x, const EnergyWeights& w) {
@@ -97,21 +120,16 @@ void bind_newton(py::module_& m) {
           py::arg("target").noconvert(), release_gil())
       .def(
           "step",
-          [](SolidNewton& self, Points x, const EnergyWeights& w, double tol, int max_cg,
-             bool keep_hessian) {
-            NewtonOptions options;
-            options.keep_hessian = keep_hessian;
-            options.tol = tol;
-            options.max_cg = max_cg;
+          [](SolidNewton& self, Points x, const EnergyWeights& w, const NewtonOptions& options) {
             const NewtonReport report = self.step(x, w, options, signal_poll());
             return std::make_pair(std::move(x), report);
           },
-          py::arg("x"), py::arg("weights"), py::arg("tol") = 1e-2, py::arg("max_cg") = 300,
-          py::arg("keep_hessian") = false, release_gil());
+          py::arg("x"), py::arg("weights"), py::arg("options") = NewtonOptions(), release_gil());
   m.def("rest_matrices", &rest_matrices, py::arg("V").noconvert(), py::arg("tets").noconvert(),
         py::arg("max_aspect"), release_gil());
   m.def("rest_triangles", &rest_triangles, py::arg("V").noconvert(), py::arg("faces").noconvert(),
-        py::arg("scale"), release_gil());
+        py::arg("scale"), py::arg("max_aspect") = std::numeric_limits<double>::infinity(),
+        release_gil());
 }
 
 void bind_rings(py::module_& m) {

@@ -90,9 +90,12 @@ if TYPE_CHECKING:
     from .resample.fields import transfer as transfer
     from .resample.hex_result import HexMesh as HexMesh
     from .resample.hexes import hex_mesh as hex_mesh
+    from .volume.fill import FillMap as FillMap
+    from .volume.fill import fill as fill
     from .volume.map import VolumeMap as VolumeMap
     from .volume.map import volume_map as volume_map
-    from .volume.options import FlipFreeOptions as FlipFreeOptions
+    from .volume.options import FillOptions as FillOptions
+    from .volume.options import VolumeOptions as VolumeOptions
 
 _EXPORTS = {
     "Torus": "base.torus",
@@ -137,8 +140,11 @@ _EXPORTS = {
     "partition": "partitions.parts",
     "AreaMap": "area.map",
     "area_map": "area.map",
-    "FlipFreeOptions": "volume.options",
+    "FillMap": "volume.fill",
+    "FillOptions": "volume.options",
+    "fill": "volume.fill",
     "VolumeMap": "volume.map",
+    "VolumeOptions": "volume.options",
     "volume_map": "volume.map",
     "Landmarks": "registration.landmarks",
     "read_landmarks": "registration.landmarks",

@@ -94,6 +94,7 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
   if (result.finite)
     each([&](size_t in, size_t out, double f) { x[out] = scale_ / f * inner_x_[in]; });
   if (!kept_) watch_.observe(result.iterations, result.digits);
+  if (result.negative_curvature || !result.finite) watch_.fail();
   return result;
 }
 

@@ -14,6 +14,11 @@ using Eigen::Vector3d;
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Block = Eigen::Map<RowMatrix3d>;
 
+// What is taken of the way to where a tet turns over, and so how far ahead that has to be looked
+// for.
+constexpr double kShare = 0.9, kWholeStep = 1.0 / kShare;
+constexpr int kHoldingPasses = 6;
+
 // Sum in blocks of fixed size: the result does not depend on the number of threads.
 double blocked_sum(const Vec& values) {
   constexpr Index kBlock = 4096;
@@ -197,28 +202,20 @@ void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, 
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;
     gradient.row(row).head<2>() += w.face * g.segment<2>(2 * a).transpose();
-    for (int b = 0; blocks && b < 3; ++b) {
-      Block(blocks + 9 * static_cast<std::ptrdiff_t>(face_slot_(f, 3 * a + b)))
-          .topLeftCorner<2, 2>() += w.face * H.block<2, 2>(2 * a, 2 * b);
-    }
+    for (int b = 0; blocks && b < 3; ++b)
+      if (const Index slot = face_slot_(f, 3 * a + b); slot >= 0)
+        Block(blocks + 9 * static_cast<std::ptrdiff_t>(slot)).topLeftCorner<2, 2>() +=
+            w.face * H.block<2, 2>(2 * a, 2 * b);
   }
 }
 
-// Axes of a vertex: Cartesian, or along the torus' coordinate circles and its normal.
+// Axes of a vertex: Cartesian, or those of the surface it glides on.
 Matrix3d SolidEnergy::frame(const PointsRef& x, Index vertex) const {
   if (motion_[vertex] != kGliding) return Matrix3d::Identity();
-  const double rho = x.row(vertex).head<2>().norm();
-  const double cu = x(vertex, 0) / rho, su = x(vertex, 1) / rho;
-  const double v = std::atan2(x(vertex, 2), rho - R_);
-  const double cv = std::cos(v), sv = std::sin(v);
-  Matrix3d Q;
-  Q.col(0) << -su, cu, 0.0;
-  Q.col(1) << -sv * cu, -sv * su, cv;
-  Q.col(2) << cv * cu, cv * su, sv;
-  return Q;
+  return barrier_.surface().frame(x.row(vertex).transpose());
 }
 
-// Rewrites one block row in vertex frames and, for a gliding vertex, adds the torus' own second
+// Rewrites one block row in vertex frames and, for a gliding vertex, adds the surface's own second
 // derivatives (clamped to stay positive semi-definite) and removes the normal unknown.
 void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
                               double* blocks) const {
@@ -234,14 +231,7 @@ void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
     if (gliding) turned.row(2).setZero();
     if (motion_[other] == kGliding) turned.col(2).setZero();
     if (gliding && other == vertex) {
-      const double rho = x.row(vertex).head<2>().norm();
-      const double cv = (rho - R_) / r_, sv = x(vertex, 2) / r_;
-      // Second derivatives of xi along arc length: uu is -radial / rho, vv is -normal / r,
-      // uv is -sin(v) e_u / rho, radial being cos(v) normal - sin(v) e_v.
-      Eigen::Matrix2d C;
-      C(0, 0) = -(cv * g[2] - sv * g[1]) / rho;
-      C(1, 1) = -g[2] / r_;
-      C(0, 1) = C(1, 0) = -sv * g[0] / rho;
+      const Eigen::Matrix2d C = barrier_.surface().bending(x.row(vertex).transpose(), g);
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
       eigen.computeDirect(C);
       turned.topLeftCorner<2, 2>() += eigen.eigenvectors() *
@@ -265,23 +255,26 @@ Points SolidEnergy::move(const PointsRef& x, const PointsRef& step, double alpha
       moved.row(i) += alpha * step.row(row);
       continue;
     }
-    const double rho = x.row(i).head<2>().norm();
-    const double u = std::atan2(x(i, 1), x(i, 0)) + alpha * step(row, 0) / rho;
-    const double v = std::atan2(x(i, 2), rho - R_) + alpha * step(row, 1) / r_;
-    const double radius = R_ + r_ * std::cos(v);
-    moved.row(i) << radius * std::cos(u), radius * std::sin(u), r_ * std::sin(v);
+    const Eigen::Vector2d along = alpha * step.row(row).head<2>().transpose();
+    moved.row(i) = barrier_.surface().moved(x.row(i).transpose(), along).transpose();
   }
   return moved;
 }
 
-double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) const {
-  const Index k = static_cast<Index>(tets_.rows());
+Points SolidEnergy::in_space(const PointsRef& x, const PointsRef& step) const {
   Points direction = Points::Zero(x.rows(), 3);
-  for (Index row = 0; row < rows(); ++row)
+  const Index n_rows = rows();
+#pragma omp parallel for schedule(static)
+  for (Index row = 0; row < n_rows; ++row)
     direction.row(row_vertex_[row]) =
         (frame(x, row_vertex_[row]) * step.row(row).transpose()).transpose();
-  double longest = 1.0 / 0.9;
-#pragma omp parallel for schedule(static) reduction(min : longest)
+  return direction;
+}
+
+Vec SolidEnergy::longest_steps(const PointsRef& x, const PointsRef& direction) const {
+  const Index k = static_cast<Index>(tets_.rows());
+  Vec longest = Vec::Constant(k, kWholeStep);
+#pragma omp parallel for schedule(static)
   for (Index t = 0; t < k; ++t) {
     Matrix3d E, D;
     for (int a = 1; a < 4; ++a) {
@@ -297,9 +290,32 @@ double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) cons
                       det(E.col(0), E.col(1), D.col(2));
     const double d2 = det(D.col(0), D.col(1), E.col(2)) + det(D.col(0), E.col(1), D.col(2)) +
                       det(E.col(0), D.col(1), D.col(2));
-    longest = std::min(longest, first_root(d0, d1, d2, D.determinant(), 1.0 / 0.9));
+    longest[t] = first_root(d0, d1, d2, D.determinant(), kWholeStep);
   }
-  return std::min(1.0, 0.9 * longest);
+  return longest;
+}
+
+double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) const {
+  return std::min(1.0, kShare * longest_steps(x, in_space(x, step)).minCoeff());
+}
+
+Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
+  Points direction = in_space(x, step), shortened = step;
+  for (int pass = 0; pass < kHoldingPasses; ++pass) {
+    const Vec longest = longest_steps(x, direction);
+    Vec share = Vec::Ones(x.rows());
+    bool held = false;
+    for (Index t = 0; t < longest.size(); ++t) {
+      if (longest[t] >= kWholeStep) continue;
+      held = true;
+      for (int a = 0; a < 4; ++a)
+        share[tets_(t, a)] = std::min(share[tets_(t, a)], kShare * kShare * longest[t]);
+    }
+    if (!held) break;
+    direction.array().colwise() *= share.array();
+    for (Index row = 0; row < rows(); ++row) shortened.row(row) *= share[row_vertex_[row]];
+  }
+  return shortened;
 }
 
 Rows SolidEnergy::near_nullspace(const PointsRef& x) const {

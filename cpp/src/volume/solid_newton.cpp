@@ -5,6 +5,31 @@
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap::volume {
+namespace {
+
+using linalg::BlockMatrix;
+using Block = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+
+// Of the diagonal, one after the other until a step is found.
+constexpr double kShifts[] = {0.0, 1e-8, 1e-4, 1e-1, 10.0};
+constexpr double kRounding = 1e-12;   // a predicted decrease that is no more of the energy is none
+constexpr double kEnergyShare = 0.2;  // see SolveOptions
+constexpr double kHeldUp = 0.5;       // a shorter step is worth a look at who holds it up
+
+// Adds a share of its mean to the diagonal of every diagonal block.
+void stiffen(BlockMatrix& A, double share) {
+  if (share == 0.0) return;
+  const Index n = A.rows();
+#pragma omp parallel for schedule(static)
+  for (Index row = 0; row < n; ++row)
+    for (Index e = A.row_ptr[row]; e < A.row_ptr[row + 1]; ++e) {
+      if (A.col[e] != row) continue;
+      Block block(A.values.data() + 9 * static_cast<std::ptrdiff_t>(e));
+      block.diagonal().array() += share * std::max(block.trace() / 3.0, 1e-300);
+    }
+}
+
+}  // namespace
 
 // The projected Hessian is stiffer than the true one, so the energy often falls at the end of the
 // full step as steeply as at its start. Then twice the step is tried.
@@ -20,21 +45,54 @@ void SolidNewton::try_double_step(Points& x, const Points& start, const Points& 
   report.alpha *= 2.0;
 }
 
+// If single tets cut the step short: the others' whole step, theirs shortened, where that is lower.
+void SolidNewton::try_held_back(Points& x, const Points& start, Points& direction,
+                                const EnergyWeights& w, NewtonReport& report) const {
+  Points shortened = energy_.held_back(start, direction);
+  Points trial = energy_.move(start, shortened, 1.0);
+  const EnergyReport there = energy_.value(trial, w);
+  if (!(there.energy < report.after.energy)) return;
+  x = std::move(trial);
+  direction = std::move(shortened);
+  report.after = there;
+  report.alpha = 1.0;
+}
+
+// The Hessian and its preconditioner. Sums of terms of very different size can come out indefinite
+// in rounding, so the diagonal grows until they serve; false if the matrix is not even finite.
+bool SolidNewton::linearise(const PointsRef& x, const EnergyWeights& w) {
+  for (const double shift : kShifts) {
+    try {
+      if (solver_) {
+        energy_.linearise(x, w, gradient_, &solver_->matrix());
+        stiffen(solver_->matrix(), shift);
+        solver_->refactor();
+      } else {
+        BlockMatrix hessian = energy_.pattern();
+        energy_.linearise(x, w, gradient_, &hessian);
+        stiffen(hessian, shift);
+        solver_ =
+            std::make_unique<linalg::BlockSolver>(std::move(hessian), energy_.near_nullspace(x));
+      }
+      return true;
+    } catch (const Error&) {
+      if (!gradient_.allFinite()) return false;
+    }
+  }
+  return false;
+}
+
 // Gradient at x, and the Hessian or what the last step tells about its change.
-void SolidNewton::renew(const PointsRef& x, const EnergyWeights& w, bool keep) {
+bool SolidNewton::renew(const PointsRef& x, const EnergyWeights& w, bool keep) {
   keep = keep && solver_ && last_step_.size() > 0;
-  if (!solver_) {
-    linalg::BlockMatrix hessian = energy_.pattern();
-    energy_.linearise(x, w, gradient_, &hessian);
-    solver_ = std::make_unique<linalg::BlockSolver>(std::move(hessian), energy_.near_nullspace(x));
+  if (keep) {
+    energy_.linearise(x, w, gradient_, nullptr);
   } else {
-    energy_.linearise(x, w, gradient_, keep ? nullptr : &solver_->matrix());
-    if (!keep) solver_->refactor();
+    changes_.clear();
+    if (!linearise(x, w)) return false;
   }
   const Vec gradient = Eigen::Map<const Vec>(gradient_.data(), gradient_.size());
-  if (!keep) {
-    changes_.clear();
-  } else if (!new_targets_) {
+  if (keep && !new_targets_) {
     const Vec change = gradient - last_gradient_;
     const double curvature = change.dot(last_step_);
     if (curvature > 1e-12 * change.norm() * last_step_.norm())
@@ -43,14 +101,18 @@ void SolidNewton::renew(const PointsRef& x, const EnergyWeights& w, bool keep) {
   new_targets_ = false;
   last_gradient_ = gradient;
   last_step_.resize(0);
+  return true;
 }
 
 // The descent direction: the two loops of limited-memory BFGS round a solve with the kept Hessian.
-Points SolidNewton::descend(const NewtonOptions& options, const Poll& poll, NewtonReport& report) {
+// False if the solve broke down.
+bool SolidNewton::descend(const NewtonOptions& options, const Poll& poll, Points& direction,
+                          NewtonReport& report) {
   linalg::SolveOptions solve;
   solve.tol = options.tol;
   solve.max_iter = options.max_cg;
   solve.must_converge = false;
+  solve.energy_share = kEnergyShare;
   Points q = -gradient_;
   Eigen::Map<Vec> flat(q.data(), q.size());
   std::vector<double> share(changes_.size());
@@ -58,16 +120,42 @@ Points SolidNewton::descend(const NewtonOptions& options, const Poll& poll, Newt
     share[k] = changes_[k].inverse * changes_[k].step.dot(flat);
     flat -= share[k] * changes_[k].gradient;
   }
-  Points direction = Points::Zero(q.rows(), 3);
-  const linalg::SolveReport solved = solver_->solve(q, direction, solve, poll);
+  direction = Points::Zero(q.rows(), 3);
+  linalg::SolveReport solved;
+  try {
+    solved = solver_->solve(q, direction, solve, poll);
+  } catch (const Error&) {
+    return false;
+  }
   Eigen::Map<Vec> d(direction.data(), direction.size());
   for (std::size_t k = 0; k < changes_.size(); ++k)
     d += (share[k] - changes_[k].inverse * changes_[k].gradient.dot(d)) * changes_[k].step;
-  report.cg_iterations = solved.iterations;
+  report.cg_iterations += solved.iterations;
   report.negative_curvature = solved.negative_curvature;
   report.cg_residual = solved.residual.size() > 0 ? solved.residual.maxCoeff() : 0.0;
   report.decrement = -(gradient_.array() * direction.array()).sum();
-  return direction;
+  return report.decrement > 0.0 && std::isfinite(report.decrement);
+}
+
+bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights& w,
+                         const NewtonOptions& options, NewtonReport& report) {
+  const Points start = x;
+  Points taken = direction;
+  double alpha = w.epsilon > 0.0 ? 1.0 : energy_.longest_step(x, direction);
+  for (int k = 0; k <= options.max_halvings && report.alpha == 0.0; ++k, alpha *= 0.5) {
+    Points trial = energy_.move(start, direction, alpha);
+    const EnergyReport there = energy_.value(trial, w);
+    if (!(there.energy <= report.before.energy - options.armijo * alpha * report.decrement))
+      continue;
+    x = std::move(trial);
+    report.after = there;
+    report.alpha = alpha;
+    if (k == 0) try_double_step(x, start, direction, w, report);
+  }
+  if (w.epsilon <= 0.0 && report.alpha < kHeldUp) try_held_back(x, start, taken, w, report);
+  if (report.alpha == 0.0) return false;
+  last_step_ = report.alpha * Eigen::Map<const Vec>(taken.data(), taken.size());
+  return true;
 }
 
 NewtonReport SolidNewton::step(Points& x, const EnergyWeights& w, const NewtonOptions& options,
@@ -79,25 +167,27 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& w, const NewtonOp
                                    " inverted tets and " + std::to_string(report.before.folds) +
                                    " folded boundary faces; untangle first");
   if (energy_.rows() == 0) return report;
-  renew(x, w, options.keep_hessian);
+  if (!renew(x, w, options.keep_hessian)) return report;
   report.gradient_norm = gradient_.norm();
   if (report.gradient_norm == 0.0) return report;
-  const Points direction = descend(options, poll, report);
-  if (!(report.decrement > 0.0)) return report;
-
-  const Points start = x;
-  double alpha = w.epsilon > 0.0 ? 1.0 : energy_.longest_step(x, direction);
-  for (int k = 0; k <= options.max_halvings; ++k, alpha *= 0.5) {
-    Points trial = energy_.move(start, direction, alpha);
-    const EnergyReport there = energy_.value(trial, w);
-    if (there.energy <= report.before.energy - options.armijo * alpha * report.decrement) {
-      x = std::move(trial);
-      report.after = there;
-      report.alpha = alpha;
-      if (k == 0) try_double_step(x, start, direction, w, report);
-      last_step_ = report.alpha * Eigen::Map<const Vec>(direction.data(), direction.size());
-      break;
+  Points direction;
+  for (const double shift : kShifts) {
+    if (shift > 0.0) {
+      stiffen(solver_->matrix(), shift);
+      solver_->refactor();
+      changes_.clear();
     }
+    report.shift = shift;
+    bool down = descend(options, poll, direction, report);
+    // Projected Hessians have no negative curvature: the preconditioner does, and is renewed.
+    if (report.negative_curvature && shift == 0.0) {
+      changes_.clear();
+      solver_->refactor();
+      down = descend(options, poll, direction, report);
+    }
+    if (!down) continue;
+    if (search(x, direction, w, options, report)) break;
+    if (report.decrement <= kRounding * std::abs(report.before.energy)) break;
   }
   return report;
 }

@@ -34,17 +34,17 @@ int thread_count() {
 
 }  // namespace
 
-SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
-                         const FlagsRef& motion, double R, double r, const PointsRef& x,
-                         BoundaryBarrier barrier)
-    : motion_(motion), R_(R), r_(r), barrier_(std::move(barrier)) {
-  const Index n = static_cast<Index>(motion.size()), k = static_cast<Index>(tets.rows());
+SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
+                         GlidingBoundary boundary)
+    : motion_(elements.motion), barrier_(std::move(boundary)) {
+  const TetsRef& tets = elements.tets;
+  const Index n = static_cast<Index>(motion_.size()), k = static_cast<Index>(tets.rows());
   const RowVector3d low = x.colwise().minCoeff();
   const double size = std::max((x.colwise().maxCoeff() - low).maxCoeff(), 1e-300);
   std::vector<std::uint32_t> code(n);
   std::vector<Index> active;
   for (Index i = 0; i < n; ++i) {
-    if (motion[i] == kFixed) continue;
+    if (motion_[i] == kFixed) continue;
     code[i] = z_order((x.row(i) - low) / size);
     active.push_back(i);
   }
@@ -70,8 +70,8 @@ SolidEnergy::SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef&
   weights_.resize(k);
   for (Index t = 0; t < k; ++t) {
     tets_.row(t) = tets.row(order_[t]);
-    rest_.row(t) = rest.row(order_[t]);
-    weights_[t] = weights[order_[t]];
+    rest_.row(t) = elements.rest.row(order_[t]);
+    weights_[t] = elements.weights[order_[t]];
   }
   build_pattern();
 }
@@ -118,9 +118,11 @@ void SolidEnergy::build_pattern() {
   face_slot_.setConstant(m, 9, -1);
   for (Index f = 0; f < m; ++f)
     for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b)
-        face_slot_(f, 3 * a + b) =
-            find_block(vertex_row_[barrier_.faces()(f, a)], vertex_row_[barrier_.faces()(f, b)]);
+      for (int b = 0; b < 3; ++b) {
+        const Index row = vertex_row_[barrier_.faces()(f, a)];
+        const Index column = vertex_row_[barrier_.faces()(f, b)];
+        if (row >= 0 && column >= 0) face_slot_(f, 3 * a + b) = find_block(row, column);
+      }
 
   const Index parts = std::max<Index>(1, std::min<Index>(thread_count(), n_rows));
   part_row_.resize(parts + 1);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import zipfile
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +14,9 @@ from . import common
 from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet, Threads
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ..certificate.findings import Certificate
     from ..maps.files import LoadedMap
     from ..maps.result import MapResult
@@ -66,7 +70,7 @@ MaxIter = Annotated[int | None, typer.Option(help="Most steps.", show_default=Fa
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this module."""
-    for command in (conformal, area, volume, certify):
+    for command in (conformal, area, volume, fill, certify):
         app.command()(command)
 
 
@@ -189,28 +193,81 @@ def volume(
     from ..base.progress import terminal
     from ..maps.files import load_map
     from ..volume.map import volume_map
+    from ..volume.options import VolumeOptions
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
-    options: dict[str, Any] = {
+    route: dict[str, Any] = {
         "method": None if method is None else method.value,
         "boundary": None if boundary is None else boundary.value,
-        "ratio": parsed_ratio(ratio),
-        "solver": solver.value,
     }
+    options = VolumeOptions(
+        ratio=parsed_ratio(ratio), phase=phase, tol=tol, vertex_exact=vertex_exact, refine=refine,
+        solver=solver.value,
+    )  # fmt: skip
     solid = common.require_solid(common.read_mesh(input, orient, compact), input, "volume")
     if start is not None:
-        solid, options["start"], options["torus"] = resumed(solid, load_map(start), start)
+        route["start"] = resumed(solid, load_map(start), start)
+        solid = route["start"].solid
     watch.lap("read")
     with terminal(quiet) as bar:
         result = volume_map(
-            solid, c=c, max_iter=max_iter, tol=tol, phase=phase,
-            vertex_exact=vertex_exact, refine=refine, keep_best=keep_best, threads=threads,
-            progress=bar, **options,
+            solid, c=c, max_iter=max_iter, options=options, keep_best=keep_best, threads=threads,
+            progress=bar, **route,
         )  # fmt: skip
     watch.lap(**result.seconds)
     conclude(result, output, json, quiet, watch)
     if result.method == "certified" and not result.certificate.certified:
+        _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
+        return 1
+    return 0
+
+
+def fill(
+    input: Input,
+    boundary: Annotated[
+        Path,
+        typer.Option(
+            help="An .npz with ids (nb,), the boundary vertices, and image (nb, 3), where they go."
+        ),
+    ],
+    output: Output,
+    refine: Annotated[
+        bool, typer.Option(help="Split interior edges and faces the boundary alone decides about.")
+    ] = True,
+    keep_best: Annotated[
+        bool,
+        typer.Option(
+            "--keep-best", help="Write the best map even if it is not certified; exit code 1."
+        ),
+    ] = False,
+    threads: Threads = None,
+    json: Json = None,
+    orient: Orient = False,
+    compact: Compact = False,
+    quiet: Quiet = False,
+) -> int:
+    """Extend a map of a solid's boundary to the inside.
+
+    One to one, of a solid of any genus.
+    """
+    from ..base.progress import terminal
+    from ..volume.fill import fill as fill_solid
+    from ..volume.options import FillOptions
+
+    common.check_outputs(output, common.map_suffixes(), json, input)
+    watch = common.Stopwatch()
+    solid = common.require_solid(common.read_mesh(input, orient, compact), input, "fill")
+    image = prescribed_image(solid, boundary)
+    watch.lap("read")
+    with terminal(quiet) as bar:
+        result = fill_solid(
+            solid, image, options=FillOptions(refine=refine), keep_best=keep_best,
+            threads=threads, progress=bar,
+        )  # fmt: skip
+    watch.lap(**result.seconds)
+    conclude(result, output, json, quiet, watch)
+    if not result.certificate.certified:
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
         return 1
     return 0
@@ -250,7 +307,7 @@ def certify(
     return 0
 
 
-def parsed_ratio(ratio: str | None) -> str | float | None:
+def parsed_ratio(ratio: str | None) -> Any:
     """``--ratio`` as the library takes it: a number where it is one."""
     try:
         return None if ratio is None else float(ratio)
@@ -258,8 +315,33 @@ def parsed_ratio(ratio: str | None) -> str | float | None:
         return ratio
 
 
-def resumed(solid: TetMesh, loaded: LoadedMap, path: Path) -> tuple[TetMesh, Any, Any]:
-    """Solid, image and torus to go on from.
+def prescribed_image(solid: TetMesh, path: Path) -> NDArray[np.float64]:
+    """The rows of a boundary file in the order of the solid's boundary vertices."""
+    import numpy as np
+
+    from ..errors import ArrayError, FileFormatError
+
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            ids, image = file["ids"].ravel(), np.asarray(file["image"], np.float64)
+    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise FileFormatError(
+            f"{path} must be an .npz with ids (nb,) and image (nb, 3): {error}"
+        ) from None
+    if image.shape != (len(ids), 3):
+        raise ArrayError(f"{path}: image has shape {image.shape}, ids {len(ids)} entries")
+    order = np.argsort(ids)
+    if not np.array_equal(ids[order], solid.boundary_vertices):
+        raise ArrayError(
+            f"{path}: ids must be the {len(solid.boundary_vertices)} boundary vertices of the "
+            "solid, each once",
+            np.setxor1d(ids, solid.boundary_vertices),
+        )
+    return np.ascontiguousarray(image[order])
+
+
+def resumed(solid: TetMesh, loaded: LoadedMap, path: Path) -> LoadedMap:
+    """The map to go on from.
 
     A map file holds the mesh that was mapped: where the input had to be refined, its refinement,
     whose first vertices are those of the input. Then that mesh is gone on with.
@@ -276,7 +358,7 @@ def resumed(solid: TetMesh, loaded: LoadedMap, path: Path) -> tuple[TetMesh, Any
         raise MeshError(f"{path} is not a map of this solid: its vertices are others")
     if mesh.n_vertices == n and not np.array_equal(mesh.T, solid.T):
         raise MeshError(f"{path} is not a map of this solid: its tets are others")
-    return mesh, loaded.image, loaded.torus
+    return loaded
 
 
 def conclude(

@@ -17,9 +17,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import _core
 from ..base.arrays import read_only
-from ..base.options import SOLVERS, callback, flag, instance, one_of, real, whole
+from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate
@@ -28,11 +27,10 @@ from ..maps.history import IterationRecord
 from ..maps.result import MapResult
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
-from ..mesh.refinement import Refinement, refine_overconstrained
-from ..volume.flip_free import FlipFreeSolver
-from ..volume.options import FlipFreeOptions
-from ..volume.untangle import untangle_refining
-from ..volume.vsem import minimize_volumetric_stretch
+from ..mesh.refinement import Refinement
+from ..volume.engine import require_certified, solve
+from ..volume.options import FillOptions
+from ..volume.problem import VolumeProblem
 from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
@@ -41,8 +39,6 @@ from .match import affine_landmark_map, match_surfaces
 __all__ = ["Registration", "register"]
 
 _log = logging.getLogger("stretchmap")
-
-_WARM_STEPS, _WARM_C = 3, 10.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -134,8 +130,7 @@ def register(
     max_iter: int = 300,
     tol: float = 1e-3,
     keep_best: bool = False,
-    solver: str = "auto",
-    options: FlipFreeOptions | None = None,
+    options: FillOptions | None = None,
     progress: Progress | None = None,
 ) -> Registration:
     """Map one solid torus onto another, every piece keeping its share of the volume.
@@ -160,9 +155,7 @@ def register(
         Stop the surface matching when a step lowers its energy by no more than this share.
     keep_best : bool
         Return the map even if it is not certified.
-    solver : {"auto", "direct", "multigrid", "jacobi", "cholmod"}
-        Linear solver of the harmonic and fixed-point steps; the last in builds that have it.
-    options : FlipFreeOptions, optional
+    options : FillOptions, optional
         Knobs of the volume optimisation.
     progress : Progress, optional
         Called once per step.
@@ -203,11 +196,10 @@ def register(
     source, target = as_solid(source, "source"), as_solid(target, "target")
     one_of("landmark_map", landmark_map, ("smooth", "affine"))
     max_iter, tol = whole("max_iter", max_iter, 0), real("tol", tol, 0.0)
-    one_of("solver", solver, SOLVERS)
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     if options is not None:
-        instance("options", options, FlipFreeOptions, "stretchmap.FlipFreeOptions(...)")
+        instance("options", options, FillOptions, "stretchmap.FillOptions(...)")
     for mesh in (source, target):
         mesh.require_solid_torus()
     marks = _landmarks(landmarks, source, target)
@@ -226,7 +218,7 @@ def register(
         )
     return _fill(
         boundary, source.n_vertices, target, marks, gauge, landmark_map, history,
-        options or FlipFreeOptions(), solver, keep_best, seconds, progress,
+        options or FillOptions(), keep_best, seconds, progress,
     )  # fmt: skip
 
 
@@ -290,8 +282,7 @@ def _fill(
     gauge: Gauge,
     landmark_map: str,
     history: tuple[IterationRecord, ...],
-    options: FlipFreeOptions,
-    solver: str,
+    options: FillOptions,
     keep_best: bool,
     seconds: dict[str, float],
     progress: Progress | None,
@@ -299,47 +290,18 @@ def _fill(
     """The volume map with the boundary prescribed."""
     clock = time.perf_counter()
     source, points = boundary.solid, boundary.points
-    n_split = source.n_vertices - n_given
-    refinement = refine_overconstrained(source)
-    solid, ids = refinement.solid, source.boundary_vertices
-    enclosed = float(_core.mesh.enclosed_volume(points, source.surface.F))
-    if not enclosed > 0.0:
-        raise SolverError("the boundary image is inside out")
-    length, center = enclosed ** (1.0 / 3.0), points.mean(axis=0)
-    V = np.ascontiguousarray((solid.V - solid.V.mean(axis=0)) / source.volume ** (1.0 / 3.0))
-    x = np.zeros((solid.n_vertices, 3))
-    x[ids] = (points - center) / length
-    fixed = np.zeros(solid.n_vertices, np.uint8)
-    fixed[ids] = 1
-    run = minimize_volumetric_stretch(
-        V, solid.T, fixed, x, c=_WARM_C, max_iter=_WARM_STEPS, tol=0.0, solver=solver,
-        progress=progress,
-    )  # fmt: skip
-    flip_free = FlipFreeSolver(
-        V=V, T=solid.T, boundary=ids, faces=ids[source.surface.F], R=2.0, r=1.0, options=options,
-        progress=progress,
-    )  # fmt: skip
-    flip_free, refinement, x, flips = untangle_refining(
-        flip_free, refinement, run.image, glide=False
-    )
-    solid = refinement.solid
-    converged, stop_reason = False, f"{flips} tets could not be untangled"
-    if flips == 0:
-        x, converged, stop_reason = flip_free.minimize(
-            x, glide=False, start=1.0, goal=options.volume_weight
-        )
-    seconds["volume"] = time.perf_counter() - clock
-    image = x * length + center
-    image[ids] = points
+    problem = VolumeProblem.of(source, points, refine=options.refine)
+    outcome = solve(problem, options, progress=progress)
+    problem, refinement = outcome.problem, outcome.problem.refinement
+    seconds = {**seconds, "volume": time.perf_counter() - clock}
+    solid, converged, stop_reason = problem.solid, outcome.converged, outcome.stop_reason
+    image = problem.x * problem.length + problem.center
+    image[source.boundary_vertices] = points
     clock = time.perf_counter()
     certificate = certify(solid, image)
     seconds["certificate"] = time.perf_counter() - clock
-    if not certificate.certified and not keep_best:
-        raise CertificationError(
-            f"the registration is not certified: {certificate.reason}; keep_best=True returns it "
-            "all the same",
-            next(iter(certificate.ids.values()), ()),
-        )
+    if not keep_best:
+        require_certified(certificate, "the registration")
     if not converged:
         _log.warning("registration not converged: %s", stop_reason)
     gap = image[marks.source] - target.V[marks.target]
@@ -352,11 +314,11 @@ def _fill(
         landmark_error=float(np.linalg.norm(gap, axis=1).max(initial=0.0)) / size,
         gauge=gauge,
         landmark_map=landmark_map,
-        refinement=refinement if refinement.n_split else None,
-        boundary_splits=n_split,
-        history=history + run.history + tuple(flip_free.history),
+        refinement=refinement if refinement is not None and refinement.n_split else None,
+        boundary_splits=source.n_vertices - n_given,
+        history=history + outcome.history,
         certificate=certificate,
-        converged=converged,
+        converged=converged and certificate.certified,
         stop_reason=stop_reason,
         seconds=seconds,
     )

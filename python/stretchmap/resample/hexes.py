@@ -52,7 +52,7 @@ def hex_mesh(
     """Mesh a solid with hexahedra: a structured grid of the solid torus, pulled back and optimized.
 
     A map that keeps shape rather than volume is the better start: one made with
-    ``options=FlipFreeOptions(volume_weight=1)``. Points move a good deal; what stays of the map is
+    ``options=VolumeOptions(volume_weight=1)``. Points move a good deal; what stays of the map is
     which part of the solid belongs to which section, block and layer.
 
     Parameters

@@ -4,32 +4,33 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import math
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Literal
 
-from numpy.typing import ArrayLike, NDArray
+import numpy as np
+from numpy.typing import NDArray
 
+from .. import _core
 from ..area.map import AreaMap, Finish, area_map
 from ..area.search import Ratio
 from ..base.arrays import read_only
+from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate
-from ..errors import CertificationError, DegenerateError, OptionError
+from ..errors import KindError, OptionError
+from ..maps.files import LoadedMap
 from ..maps.result import MapResult
 from ..mesh.given import as_solid, require_same_mesh
-from ..mesh.overconstrained import overconstrained_elements
-from ..mesh.refinement import Refinement, refine_overconstrained
-from .options import FlipFreeOptions
-from .problem import SolidProblem
-from .routes import SolidRun, certified_route, vsem_route
-
-if TYPE_CHECKING:
-    from ..mesh.meshes import TetMesh
+from ..mesh.meshes import TetMesh
+from ..mesh.refinement import Refinement
+from .engine import require_certified, solve
+from .options import VolumeOptions
+from .problem import Outcome, VolumeProblem
+from .vsem import run_vsem
 
 __all__ = ["VolumeMap", "volume_map"]
 
@@ -121,21 +122,13 @@ class VolumeMap(MapResult):
 def volume_map(
     solid: TetMesh,
     *,
-    method: str | None = None,
-    boundary: str | None = None,
+    method: Literal["certified", "vsem"] | None = None,
+    boundary: Literal["glide", "frozen"] | None = None,
     c: float | None = None,
     max_iter: int | None = None,
-    tol: float | None = None,
-    ratio: Ratio | float | None = None,
-    phase: float | None = None,
-    boundary_map: AreaMap | None = None,
-    start: ArrayLike | None = None,
-    torus: Torus | None = None,
-    vertex_exact: bool = False,
-    refine: bool = True,
+    start: AreaMap | VolumeMap | LoadedMap | None = None,
+    options: VolumeOptions | None = None,
     keep_best: bool = False,
-    solver: str = "auto",
-    options: FlipFreeOptions | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> VolumeMap:
@@ -155,37 +148,15 @@ def volume_map(
         Certified route only. ``"glide"`` (default) lets boundary vertices move on the torus,
         ``"frozen"`` keeps them where the area-preserving map put them.
     c : float, optional
-        Regularisation constant of (5.6) of the ``"vsem"`` method, dimensionless, default 0.
+        Regularization constant of (5.6) of the ``"vsem"`` method, dimensionless, default 0.
     max_iter : int, optional
-        Most steps of ``"vsem"`` (default 20) or of the last stage of ``"certified"``.
-    tol : float, optional
-        Stop when a step lowers the energy by no more than this share (default 1e-6 for ``"vsem"``,
-        2e-3 or, with a frozen boundary, 5e-4 for ``"certified"``).
-    ratio : "conformal", "search" or float, optional
-        R / r of the torus, as in `area_map`. Default: the conformal one for ``"vsem"``, a search
-        for ``"certified"``.
-    phase : float, optional
-        As in `area_map`.
-    boundary_map : AreaMap, optional
-        Map of ``solid.surface`` to be used instead of a computed one.
-    start : array_like, shape (n, 3), optional
-        Image to go on from, such as that of a saved map, with its ``torus``; the boundary vertices
-        have to lie on it.
-    torus : Torus, optional
-        With ``start`` only.
-    vertex_exact : bool
-        Certified route only: in the end make the ring volume (6.5) of every interior vertex exact,
-        unless that turns a tet over or costs too much (`FlipFreeOptions.exact_std_factor`); the
-        result says whether it was done.
-    refine : bool
-        Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
-        can repair, and edges round single tets that stay inverted. False: refuse such a mesh.
+        Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
+    start : AreaMap, VolumeMap or LoadedMap, optional
+        A map of ``solid.surface`` to prescribe the boundary, or a map of ``solid`` to go on from.
+    options : VolumeOptions, optional
+        All other options.
     keep_best : bool
         Return the best map found even if it is not certified.
-    solver : {"auto", "direct", "multigrid", "jacobi", "cholmod"}
-        Linear solver of the harmonic and fixed-point steps; the last in builds that have it.
-    options : FlipFreeOptions, optional
-        Finer knobs of the certified route.
     threads : int, optional
         Threads to use, see `threads`; the result does not depend on it.
     progress : Progress, optional
@@ -204,11 +175,11 @@ def volume_map(
     CertificationError
         The certified route left flipped tets or failed the certificate, ``ids`` are the elements.
     KindError
-        ``boundary_map`` is of another surface than the solid's.
+        ``start`` belongs to another mesh, or names no torus.
     OptionError
         An option out of range or combined with one it excludes.
     SolverError
-        A linear solve broke down.
+        A linear solve of Algorithm 5.1 broke down.
 
     Notes
     -----
@@ -233,9 +204,10 @@ def volume_map(
     solid = as_solid(solid)
     if method is None:
         method = "certified" if c is None else "vsem"
-    _check_options(method, boundary, c, max_iter, tol, start, torus, boundary_map)
-    if vertex_exact and method == "vsem":
-        raise OptionError("vertex_exact belongs to the certified route; leave c and method out")
+    options = VolumeOptions() if options is None else options
+    _check_options(method, boundary, c, max_iter, options)
+    keep_best = flag("keep_best", keep_best)
+    callback("progress", progress)
     if solid.n_tets > _LARGE:
         _log.info(
             "%d tets, method %s: about %.1f GiB of memory",
@@ -243,60 +215,28 @@ def volume_map(
         )  # fmt: skip
     solid.require_solid_torus()
     seconds: dict[str, float] = {}
-
-    certified = method == "certified"
-    if start is None and boundary_map is None:
+    if start is None:
         clock = time.perf_counter()
-        if ratio is None:
-            ratio = "search" if certified else "conformal"
-        # A gliding boundary loses the exact areas again; a held one is only as good as them.
-        # Its last per cent costs triangles their shape, which the interior has to pay for.
-        finish: Finish = "face" if boundary == "frozen" else "none"
-        area_tol = 0.05
-        if not certified:
-            finish, area_tol = "ring", 5e-3
-        boundary_map = area_map(
-            solid.surface, ratio=ratio, phase=phase, finish=finish, tol=area_tol, keep_best=True,
-            progress=progress,
-        )  # fmt: skip
+        start = _boundary_map(solid, method, boundary, options, progress)
         seconds["boundary"] = time.perf_counter() - clock
-    elif boundary_map is not None:
-        require_same_mesh(
-            solid.surface,
-            boundary_map.mesh,
-            "boundary_map is of another surface",
-            "pass area_map(solid.surface)",
-        )
-
-    refinement = None
-    if certified:
-        clock = time.perf_counter()
-        if refine:
-            refinement = refine_overconstrained(solid)
-        else:
-            _refuse_overconstrained(solid)
-        seconds["refine"] = time.perf_counter() - clock
-    problem = SolidProblem.build(solid, refinement, boundary_map, start, torus)
-    if certified:
-        boundary = boundary or "glide"
-        problem, run = certified_route(
-            problem, _with_overrides(options or FlipFreeOptions(), max_iter, tol),
-            glide=boundary == "glide", vertex_exact=vertex_exact, solver=solver, progress=progress,
-        )  # fmt: skip
-    else:
-        boundary = "frozen"
-        run = vsem_route(
-            problem, c=c or 0.0, max_iter=20 if max_iter is None else max_iter,
-            tol=1e-6 if tol is None else tol, solver=solver, progress=progress,
-        )  # fmt: skip
-    result = _result(problem, run, method, boundary, boundary_map, seconds)
-    if certified and not result.certificate.certified and not keep_best:
-        ids = next(iter(result.certificate.ids.values()), ())
-        raise CertificationError(
-            f"the map is not certified: {result.certificate.reason}; keep_best=True returns it all "
-            "the same",
-            ids,
-        )
+    image, torus = _start_of(solid, instance("start", start, MapResult, "a map of this solid"))
+    boundary_map = start if isinstance(start, AreaMap) else None
+    if method == "vsem":
+        problem = VolumeProblem.of(solid, image, torus=torus, refine=None)
+        outcome = run_vsem(problem, options, c=c or 0.0, max_iter=max_iter, progress=progress)
+        return _result(outcome, method, "frozen", boundary_map, seconds)
+    if max_iter is not None:
+        options = dataclasses.replace(options, frozen_iter=max_iter, glide_iter=max_iter)
+    if options.tol is not None:
+        options = dataclasses.replace(options, frozen_tol=options.tol, glide_tol=options.tol)
+    clock = time.perf_counter()
+    problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
+    seconds["refine"] = time.perf_counter() - clock
+    boundary = boundary or "glide"
+    outcome = solve(problem, options, glide=boundary == "glide", progress=progress)
+    result = _result(outcome, method, boundary, boundary_map, seconds)
+    if not keep_best:
+        require_certified(result.certificate, "the map")
     return result
 
 
@@ -305,67 +245,71 @@ def _check_options(
     boundary: str | None,
     c: float | None,
     max_iter: int | None,
-    tol: float | None,
-    start: ArrayLike | None,
-    torus: Torus | None,
-    boundary_map: AreaMap | None,
+    options: VolumeOptions,
 ) -> None:
-    if method not in ("certified", "vsem"):
-        raise OptionError(f"method must be 'certified' or 'vsem', got {method!r}")
-    if boundary not in (None, "glide", "frozen"):
-        raise OptionError(f"boundary must be 'glide' or 'frozen', got {boundary!r}")
+    one_of("method", method, ("certified", "vsem"))
+    if boundary is not None:
+        one_of("boundary", boundary, ("glide", "frozen"))
+    instance("options", options, VolumeOptions, "stretchmap.VolumeOptions(...)")
     if method == "vsem" and boundary == "glide":
         raise OptionError(
             "Algorithm 5.1 holds the boundary; use method='certified' to let it glide"
         )
+    if method == "vsem" and options.vertex_exact:
+        raise OptionError("vertex_exact belongs to the certified route; leave c and method out")
     if method == "certified" and c is not None:
         raise OptionError("c belongs to Algorithm 5.1; use method='vsem' or leave it out")
-    if c is not None and not (c >= 0.0 and math.isfinite(c)):
-        raise OptionError(f"c must be finite and not negative, got {c}")
-    if max_iter is not None and max_iter < 0:
-        raise OptionError(f"max_iter must not be negative, got {max_iter}")
-    if tol is not None and not tol >= 0.0:
-        raise OptionError(f"tol must not be negative, got {tol}")
-    if (start is None) != (torus is None):
-        raise OptionError("start and torus go together: an image to go on from and its torus")
-    if start is not None and boundary_map is not None:
-        raise OptionError("give either start or boundary_map, not both")
-
-
-def _with_overrides(
-    options: FlipFreeOptions, max_iter: int | None, tol: float | None
-) -> FlipFreeOptions:
+    if c is not None:
+        real("c", c, 0.0)
     if max_iter is not None:
-        options = dataclasses.replace(options, frozen_iter=max_iter, glide_iter=max_iter)
-    return options if tol is None else dataclasses.replace(options, glide_tol=tol, frozen_tol=tol)
+        whole("max_iter", max_iter, 0)
 
 
-def _refuse_overconstrained(solid: TetMesh) -> None:
-    found = overconstrained_elements(solid)
-    if len(found):
-        raise DegenerateError(
-            f"{len(found.edges)} interior edges and {len(found.faces)} interior faces have all "
-            "their vertices on the boundary, so the boundary map alone decides about the tets at "
-            "them; allow their refinement (refine=True)",
-            found.tets,
-        )
+def _boundary_map(
+    solid: TetMesh,
+    method: str,
+    boundary: str | None,
+    options: VolumeOptions,
+    progress: Progress | None,
+) -> AreaMap:
+    # A gliding boundary loses the exact areas again; a held one is only as good as them. Its last
+    # per cent costs triangles their shape, which the interior has to pay for.
+    finish: Finish = "face" if boundary == "frozen" else "none"
+    ratio: Ratio = "search"
+    tol = 0.05
+    if method == "vsem":
+        finish, tol, ratio = "ring", 5e-3, "conformal"
+    return area_map(
+        solid.surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish, tol=tol,
+        keep_best=True, progress=progress,
+    )  # fmt: skip
+
+
+def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
+    mesh = solid if isinstance(start.mesh, TetMesh) else solid.surface
+    require_same_mesh(
+        mesh, start.mesh, "start is a map of another mesh", "pass a map of the solid or its surface"
+    )
+    if start.torus is None:
+        raise KindError("start must be a map to a torus")
+    return start.image, start.torus
 
 
 def _result(
-    problem: SolidProblem,
-    run: SolidRun,
+    outcome: Outcome,
     method: str,
     boundary: str,
     boundary_map: AreaMap | None,
     seconds: dict[str, float],
 ) -> VolumeMap:
-    scale, refinement = problem.result_scale(run.x), problem.refinement
-    image, torus = run.x * scale, problem.torus.scaled(scale)
+    problem, refinement = outcome.problem, outcome.problem.refinement
+    assert problem.torus is not None
+    volume = float(_core.volume.signed_tet_volumes(problem.x, problem.solid.T).sum())
+    scale = (problem.solid.volume / volume) ** (1.0 / 3.0)
+    image, torus = problem.x * scale, problem.torus.scaled(scale)
     clock = time.perf_counter()
     certificate = certify(problem.solid, image, torus)
-    seconds = {**seconds, **run.seconds, "certificate": time.perf_counter() - clock}
-    if not run.converged:
-        _log.warning("volume map not converged: %s", run.stop_reason)
+    seconds = {**seconds, **outcome.seconds, "certificate": time.perf_counter() - clock}
     result = VolumeMap(
         mesh=problem.solid,
         image=read_only(image),
@@ -374,13 +318,15 @@ def _result(
         boundary=boundary,
         boundary_map=boundary_map,
         refinement=refinement if refinement is not None and refinement.n_split else None,
-        history=run.history,
+        history=outcome.history,
         certificate=certificate,
-        converged=run.converged,
-        stop_reason=run.stop_reason,
+        converged=outcome.converged,
+        stop_reason=outcome.stop_reason,
         seconds=seconds,
-        vertex_exact=run.vertex_exact,
+        vertex_exact=outcome.vertex_exact,
     )
+    if not result.converged:
+        _log.warning("volume map not converged: %s", result.stop_reason)
     if result.distortion.flips:
         _log.warning("volume map has %d flipped tets", result.distortion.flips)
     return result

@@ -1,71 +1,156 @@
-"""Knobs of the flip-free optimisation."""
+"""Options of the volume maps, checked when they are made."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FlipFreeOptions"]
+from ..area.search import Ratio
+from ..base.options import SOLVERS, flag, one_of, real, whole
+
+__all__ = ["FillOptions", "VolumeOptions"]
 
 
-@dataclass(frozen=True)
-class FlipFreeOptions:
-    """Knobs of the flip-free minimisation; the defaults are meant for every mesh.
+@dataclass(frozen=True, kw_only=True)
+class FillOptions:
+    """Options of a volume map whose boundary is prescribed; the defaults are meant for every mesh.
 
     Attributes
     ----------
+    refine : bool
+        Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
+        can repair, and edges round tets that stay inverted. False: such a mesh is refused.
+    time_limit : float
+        Processor time per tet, in seconds, after which no further stage is begun and a map with
+        inverted tets is given up; a small mesh gets some seconds all the same.
     volume_weight : float
-        Largest lambda.
+        Largest weight lambda of the volume term against the shape term.
     growth : float
         Factor by which lambda grows.
-    frozen_weight : float
-        Lambda at which the boundary starts to glide, if it does.
-    face_weight : float
-        Weight of the boundary triangles' barrier while the boundary glides.
     max_aspect : float
         Source tets with a larger ratio of extreme singular values (relative to a regular tet) are
-        slivers: their shape is not asked to be kept.
-    untangle_iter, frozen_iter, glide_iter : int
-        Most steps of each stage.
-    target_iter, shift_iter : int
-        Most steps of each kind that equalise the volumes along u, v and s.
-    marginal_tol : float
-        No more of the first kind when no level is off by more than this share of the volume.
+        slivers: their shape is not asked to be kept. Boundary triangles likewise.
     floor : float
-        Least determinant untangling aims for: a start closer to folding than that makes the barrier
-        too steep for rounded arithmetic.
-    glide_tol, frozen_tol : float
-        At the largest lambda: stop when a step lowers the energy by no more than this share. With
-        the boundary held the decrease is slower from the beginning.
-    exact_std_factor : float
-        `FlipFreeSolver.make_rings_exact` may raise the SD of the tet ratios by this factor.
+        Least determinant untangling aims for, 1 being what a tet may expect where it lies: closer
+        to folding the barrier is so steep that all following steps are short.
+    untangle_iter, frozen_iter : int
+        Most steps of these stages.
+    patience : int
+        Untangling steps without fewer inverted tets before something else is tried.
+    frozen_tol : float
+        At the largest lambda: stop when a step lowers the energy by no more than this share.
+    frozen_weight, face_weight, glide_iter, glide_tol
+        Where the boundary glides: lambda at which that starts, weight of the boundary triangles'
+        barrier, most steps and the share at which to stop.
     shared : int
         Most steps in a row that share one Hessian; 1 renews it at every step.
-    cg_tol, max_cg
-        Relative residual and most iterations of the linear solves.
+    cg_tol : float
+    max_cg : int
+        Relative residual and most iterations of the linear solves of Newton steps.
+    solver : {"auto", "direct", "multigrid", "jacobi", "cholmod"}
+        Linear solver of the harmonic start and of Algorithm 5.1; the last in builds that have it.
+
+    Raises
+    ------
+    OptionError
+        A value out of range.
 
     Examples
     --------
     >>> import stretchmap as sm
-    >>> options = sm.FlipFreeOptions(glide_iter=5)
-    >>> sm.volume_map(sm.samples.solid_torus(600), options=options).distortion.flips
+    >>> ball = sm.samples.ball(3)
+    >>> options = sm.FillOptions(volume_weight=10.0)
+    >>> sm.fill(ball, 2.0 * ball.surface.V, options=options).distortion.flips
     0
     """
 
+    refine: bool = True
+    time_limit: float = 1e-3
     volume_weight: float = 1e4
     growth: float = 2.0
+    max_aspect: float = 6.0
+    floor: float = 0.02
+    untangle_iter: int = 400
+    frozen_iter: int = 150
+    patience: int = 30
+    frozen_tol: float = 5e-4
     frozen_weight: float = 10.0
     face_weight: float = 1.0
-    max_aspect: float = 6.0
-    untangle_iter: int = 200
-    frozen_iter: int = 150
-    glide_iter: int = 60
-    target_iter: int = 8
-    shift_iter: int = 4
-    marginal_tol: float = 1e-4
-    floor: float = 1e-3
+    glide_iter: int = 200
     glide_tol: float = 2e-3
-    frozen_tol: float = 5e-4
-    exact_std_factor: float = 1.25
     shared: int = 5
     cg_tol: float = 0.1
     max_cg: int = 200
+    solver: str = "auto"
+
+    def __post_init__(self) -> None:
+        flag("refine", self.refine)
+        one_of("solver", self.solver, SOLVERS)
+        for name in ("time_limit", "volume_weight", "frozen_weight", "face_weight", "cg_tol"):
+            real(name, getattr(self, name), above=0.0)
+        for name in ("growth", "max_aspect"):
+            real(name, getattr(self, name), 1.0)
+        for name in ("floor", "frozen_tol", "glide_tol"):
+            real(name, getattr(self, name), 0.0, below=1.0)
+        for name in ("untangle_iter", "frozen_iter", "glide_iter"):
+            whole(name, getattr(self, name), 0)
+        for name in ("patience", "shared", "max_cg"):
+            whole(name, getattr(self, name), 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class VolumeOptions(FillOptions):
+    """Options of `volume_map`; those of `FillOptions` and:
+
+    Attributes
+    ----------
+    ratio : "conformal", "search" or float, optional
+        R / r of the torus, as in `area_map`. Default: the conformal one for ``"vsem"``, a search
+        for ``"certified"``.
+    phase : float, optional
+        As in `area_map`.
+    tol : float, optional
+        Stop when a step lowers the energy by no more than this share: ``"vsem"``, default 1e-6, or
+        any stage of ``"certified"``, in place of ``frozen_tol`` and ``glide_tol``.
+    target_iter, shift_iter : int
+        Most steps of each kind that equalize the volumes along u, v and s.
+    marginal_tol : float
+        No more of the first kind when no level is off by more than this share of the volume.
+    vertex_exact : bool
+        In the end make the ring volume (6.5) of every interior vertex exact, unless that turns a
+        tet over or costs too much; the result says whether it was done.
+    exact_std_factor : float
+        That may raise the SD of the tet ratios by this factor.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> options = sm.VolumeOptions(ratio=2.5, glide_iter=3)
+    >>> result = sm.volume_map(sm.samples.solid_torus(500), options=options)
+    >>> round(result.torus.ratio, 6)
+    2.5
+    """
+
+    ratio: Ratio | float | None = None
+    phase: float | None = None
+    tol: float | None = None
+    target_iter: int = 8
+    shift_iter: int = 4
+    marginal_tol: float = 1e-4
+    vertex_exact: bool = False
+    exact_std_factor: float = 1.25
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        flag("vertex_exact", self.vertex_exact)
+        if isinstance(self.ratio, str):
+            one_of("ratio", self.ratio, ("conformal", "search"))
+        elif self.ratio is not None:
+            real("ratio", self.ratio, above=1.0)
+        if self.phase is not None:
+            real("phase", self.phase)
+        if self.tol is not None:
+            real("tol", self.tol, 0.0)
+        for name in ("target_iter", "shift_iter"):
+            whole(name, getattr(self, name), 0)
+        real("marginal_tol", self.marginal_tol, 0.0)
+        real("exact_std_factor", self.exact_std_factor, 1.0)

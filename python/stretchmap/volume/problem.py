@@ -2,78 +2,182 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .. import _core
-from ..area.map import AreaMap
 from ..base.torus import Torus
-from ..errors import ArrayError, DegenerateError
-from ..mesh.refinement import Refinement
+from ..errors import DegenerateError, OrientationError
+from ..maps.history import IterationRecord
+from ..mesh.overconstrained import overconstrained_elements
+from ..mesh.refinement import Refinement, refine_overconstrained
+from .model import SolidModel
+from .options import FillOptions
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TetMesh
 
-__all__ = ["SolidProblem"]
+__all__ = ["Outcome", "VolumeProblem"]
 
 
-@dataclass(frozen=True)
-class SolidProblem:
-    """Source and torus on one scale: the polyhedron the boundary image encloses has volume 1."""
+@dataclass(frozen=True, eq=False)
+class VolumeProblem:
+    """Source and image, scaled so that what the boundary image encloses has volume 1.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        The input, or its refinement.
+    refinement : Refinement or None
+        That made the solid; None: it must not be refined.
+    V, x : ndarray, shape (n, 3)
+        Source and image here; inner rows of ``x`` count only if it is ``warm``.
+    center : ndarray, shape (3,)
+    length : float
+        A point p here is ``p * length + center`` in the image asked for.
+    warm : bool
+        Whether ``x`` is a whole map.
+    torus : Torus or None
+        What the boundary lies on here, if it may glide; centered at the origin.
+    scale : ndarray, shape (n,), or None
+        As in `SolidModel`.
+    """
 
     solid: TetMesh
+    refinement: Refinement | None
     V: NDArray[np.float64]
     x: NDArray[np.float64]
-    torus: Torus
-    scale: float  # lengths of the result per length here
-    warm: bool  # x is a whole map, not only its boundary
-    refinement: Refinement | None  # that made the solid; None: it must not be refined
+    center: NDArray[np.float64]
+    length: float
+    warm: bool
+    torus: Torus | None = None
+    scale: NDArray[np.float64] | None = None
 
     @classmethod
-    def build(
+    def of(
         cls,
         solid: TetMesh,
-        refinement: Refinement | None,
-        boundary_map: AreaMap | None,
-        start: ArrayLike | None,
-        torus: Torus | None,
-    ) -> SolidProblem:
+        image: NDArray[np.float64],
+        *,
+        torus: Torus | None = None,
+        refine: bool | None = True,
+    ) -> VolumeProblem:
+        """Of an image of the boundary vertices (nb, 3), or of all vertices (n, 3) to go on from.
+
+        Parameters
+        ----------
+        solid : TetMesh
+        image : ndarray
+        torus : Torus, optional
+            What the boundary image lies on.
+        refine : bool or None
+            Whether overconstrained elements are split or refused; None: neither.
+
+        Raises
+        ------
+        DegenerateError
+            ``refine=False`` and some interior edge or face cannot be repaired; ``ids`` are tets.
+        OrientationError
+            The boundary image is inside out.
+        """
+        refinement = None
+        if refine:
+            refinement = refine_overconstrained(solid)
+        elif refine is not None:
+            _refuse_overconstrained(solid)
         mesh = solid if refinement is None else refinement.solid
+        warm = len(image) == solid.n_vertices
         ids = solid.boundary_vertices
-        if start is not None:
-            assert torus is not None
-            image = np.array(start, dtype=np.float64)
-            if image.shape != solid.V.shape:
-                raise ArrayError(f"start must have shape {solid.V.shape}, got {image.shape}")
+        boundary = image[ids] if warm else image
+        enclosed = float(_core.mesh.enclosed_volume(boundary, solid.surface.F))
+        if not enclosed > 0.0:
+            raise OrientationError(
+                "the boundary image is inside out, or encloses no volume: mirror it, or reverse "
+                "the order of its faces"
+            )
+        length = enclosed ** (1.0 / 3.0)
+        center = np.zeros(3) if torus is not None else boundary.mean(axis=0)
+        x = np.zeros((mesh.n_vertices, 3))
+        if warm:
             x = image if refinement is None else refinement.prolong(image)
         else:
-            assert boundary_map is not None
-            torus = boundary_map.torus
-            x = np.zeros((mesh.n_vertices, 3))
-            x[ids] = boundary_map.image
-        enclosed = _enclosed_volume(x[ids], solid.surface.F)
-        if not enclosed > 0.0:
-            raise DegenerateError("the boundary image encloses no volume; is it inside out?")
-        shrink = enclosed ** (-1.0 / 3.0)
-        scale = solid.volume ** (1.0 / 3.0)
-        V = (mesh.V - mesh.V.mean(axis=0)) / scale
-        return cls(mesh, V, x * shrink, torus.scaled(shrink), scale, start is not None, refinement)
+            x[ids] = image
+        return cls(
+            solid=mesh,
+            refinement=refinement,
+            V=np.ascontiguousarray((mesh.V - mesh.V.mean(axis=0)) / solid.volume ** (1.0 / 3.0)),
+            x=np.ascontiguousarray((x - center) / length),
+            center=center,
+            length=length,
+            warm=warm,
+            torus=None if torus is None else torus.scaled(1.0 / length),
+        )
 
-    @property
-    def fixed(self) -> NDArray[np.uint8]:
-        flags = np.zeros(self.solid.n_vertices, np.uint8)
-        flags[self.solid.boundary_vertices] = 1
-        return flags
+    def halved(self, edges: NDArray[np.int32]) -> VolumeProblem:
+        """With interior edges (e, 2) of the solid halved, in the image, too."""
+        assert self.refinement is not None
+        passes = len(self.refinement.halved)
+        refinement = self.refinement.halve(edges)
+        fields = {"V": self.V, "x": self.x}
+        if self.scale is not None:
+            fields["scale"] = self.scale
+        for ends in refinement.halved[passes:]:
+            fields = {k: np.concatenate([at, at[ends].mean(axis=1)]) for k, at in fields.items()}
+        return dataclasses.replace(
+            self,
+            solid=refinement.solid,
+            refinement=refinement,
+            **fields,  # type: ignore[arg-type]
+        )
 
-    def result_scale(self, x: NDArray[np.float64]) -> float:
-        """Factor that gives the image the volume of the source."""
-        volume = float(_core.volume.signed_tet_volumes(x, self.solid.T).sum())
-        return float(self.scale * volume ** (-1.0 / 3.0))
+    def model(self, options: FillOptions) -> SolidModel:
+        """What the stages work on."""
+        ids = self.solid.boundary_vertices
+        return SolidModel(
+            V=self.V,
+            T=self.solid.T,
+            boundary=ids,
+            faces=ids[self.solid.surface.F],
+            options=options,
+            torus=self.torus,
+            scale=self.scale,
+        )
 
 
-def _enclosed_volume(points: NDArray[np.float64], faces: NDArray[np.int32]) -> float:
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a volume optimization ends with, on the scale of the problem.
+
+    Attributes
+    ----------
+    problem : VolumeProblem
+        With the solid refined where that was needed, and ``x`` the image.
+    history : tuple of IterationRecord
+    converged : bool
+    stop_reason : str
+    seconds : dict
+        By stage.
+    vertex_exact : bool
+    """
+
+    problem: VolumeProblem
+    history: tuple[IterationRecord, ...]
+    converged: bool
+    stop_reason: str
+    seconds: dict[str, float]
+    vertex_exact: bool = False
+
+
+def _refuse_overconstrained(solid: TetMesh) -> None:
+    found = overconstrained_elements(solid)
+    if len(found):
+        raise DegenerateError(
+            f"{len(found.edges)} interior edges and {len(found.faces)} interior faces have all "
+            "their vertices on the boundary, so the boundary map alone decides about the tets at "
+            "them; allow their refinement (refine=True)",
+            found.tets,
+        )

@@ -1,80 +1,281 @@
-"""Untangling a solid that may be too coarse for the map of its boundary.
+"""Turning every inverted tet: foldover-free mapping by continuation, everywhere or in patches.
 
-Where the boundary image bends sharply, an interior vertex may have no place from where it sees the
-inner side of all boundary faces round it: its tets cannot all be positive, whatever the rest does.
-Then untangling gets stuck with a few inverted tets, and the edges that tie their interior vertices
-to the boundary are halved before it goes on.
+The regularized energy of ``element_energy.hpp`` is lowered by Newton steps while its epsilon
+follows the worst determinant down (Garanzha et al., ACM TOG 40(4), 2021, section 3.2). Determinants
+are taken relative to the volume a tet may expect (`SolidModel.local_volumes`): where the boundary
+image squeezes a limb into a millionth of its area, its tets are not inverted for being small.
+
+A few steps for the whole solid leave a handful of inverted tets at most. These are then worked on
+in patches, each a problem of its own with all other vertices held, at no cost to speak of.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import logging
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from .. import _core
-from ..mesh.refinement import Refinement, crowded_edges
-from .flip_free import FlipFreeSolver
+from .model import FIXED, GLIDING, Budget, History, SolidModel
 
-_log = logging.getLogger("stretchmap")
+__all__ = ["Untangled", "stuck_tets", "untangle_patches", "untangle_whole"]
 
-_ROUNDS = 10
-# Inverted tets as a share of all: with more, it is not a matter of single places; with so few,
-# halving is cheaper than patience.
-_MOST_STUCK, _FEW = 0.01, 0.001
-# Times the fewest so far, and so many more: halving breeds more than it cures.
-_TIMES, _MORE = 2, 100
+_WIDEST = 1.0  # epsilon: determinants are 1 where all is well, a larger one tells nothing apart
+_LEAST = 1e-9
+_SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
+_BETTER = 1.05
+_ENOUGH = 6  # steps without progress once nothing is inverted, on the way to the floor
+_FEW, _FEW_SHARE = 30, 0.002  # inverted elements that are better worked on in patches
+_FEW_PATIENCE = 4
+_PATCH_STEPS, _PATCH_PATIENCE = 150, 40
 
 
-def untangle_refining(
-    solver: FlipFreeSolver,
-    refinement: Refinement,
+@dataclass(frozen=True, eq=False)
+class Untangled:
+    """Where untangling ended.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n, 3)
+    left : int
+        Inverted tets and, where the boundary glides, folded faces.
+    worst : float
+        Least determinant, relative to the volume the tet may expect.
+    """
+
+    x: NDArray[np.float64]
+    left: int
+    worst: float
+
+
+@dataclass
+class Patience:
+    """Counts the steps since the last one that got further.
+
+    Fewer inverted elements are progress, then a better worst one; and energy that still falls is no
+    standstill.
+    """
+
+    fewest: float = math.inf
+    highest: float = -math.inf
+    since: int = 0
+
+    def note(self, left: int, worst: float, settled: bool) -> None:
+        if left < self.fewest or (left == 0 and worst > _BETTER * self.highest):
+            self.fewest, self.highest, self.since = left, worst, 0
+        elif settled:
+            self.since += 1
+
+
+def _continue(
+    newton: _core.volume.SolidNewton,
     x: NDArray[np.float64],
     *,
-    glide: bool,
-) -> tuple[FlipFreeSolver, Refinement, NDArray[np.float64], int]:
-    """`FlipFreeSolver.untangle`, with the solid refined where tets stay inverted.
+    face: float,
+    floor: float,
+    steps: int,
+    enough: Callable[[int, int], bool],
+    linear: _core.volume.NewtonOptions,
+    budget: Budget,
+    note: Callable[[int, NDArray[np.float64], _core.volume.NewtonReport, float], None]
+    | None = None,
+) -> Untangled:
+    """Follow the worst determinant down with epsilon; ``enough(left, since)`` ends it."""
+    state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
+    left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
+    epsilon = min(max(0.2 * abs(worst), 10.0 * floor), _WIDEST)
+    patience = Patience(left, worst)
+    best = Untangled(x, left, worst)
+    for iteration in range(1, steps + 1):
+        if left == 0 and (worst >= floor or patience.since >= _ENOUGH):
+            break
+        if (left and enough(left, patience.since)) or budget.spent:
+            break
+        weights = _core.volume.EnergyWeights(1.0, 1.0, epsilon, face)
+        x, step = newton.step(x, weights, linear)
+        before, after = step.before.energy, step.after
+        if note is not None:
+            note(iteration, x, step, epsilon)
+        left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
+        settled = before - after.energy <= _SETTLED * (before + 2.0)
+        patience.note(left, worst, settled)
+        if (left, -worst) <= (best.left, -best.worst):
+            best = Untangled(x, int(left), worst)
+        if settled:
+            epsilon = max(_next_epsilon(epsilon, worst), _LEAST)
+    return best
+
+
+def _next_epsilon(epsilon: float, worst: float) -> float:
+    """Regularization for the next step, from the worst determinant (Garanzha et al., 2021)."""
+    chi = 0.5 * (worst + math.sqrt(epsilon * epsilon + worst * worst))
+    goal = 0.9 * chi
+    return 2.0 * math.sqrt(max(goal * (goal - worst), 1e-24))
+
+
+def untangle_whole(
+    model: SolidModel, x: NDArray[np.float64], history: History, *, glide: bool
+) -> Untangled:
+    """Untangle all tets at once, until none or so few are inverted that patches serve better.
 
     Parameters
     ----------
-    solver : FlipFreeSolver
-        Of ``refinement.solid``, its source positions scaled and shifted.
-    refinement : Refinement
+    model : SolidModel
     x : ndarray, shape (n, 3)
+    history : History
+        Gets a record per step, of the stage ``"untangle"``.
     glide : bool
+        Whether the boundary may glide; then folded boundary faces are unfolded, too.
+    """
+    o = model.options
+    newton = model.newton(x, glide=glide)
+    newton.set_targets(model.local_volumes)
+    # Gliding is a matter of the whole boundary.
+    few = 0 if glide else max(_FEW, int(_FEW_SHARE * len(model.T)))
+
+    def note(
+        iteration: int, at: NDArray[np.float64], step: _core.volume.NewtonReport, epsilon: float
+    ) -> None:
+        history.add(
+            "untangle", iteration, at, energy=step.after.energy, step=step.alpha,
+            residual=epsilon, total=o.untangle_iter,
+        )  # fmt: skip
+
+    return _continue(
+        newton,
+        x,
+        face=o.face_weight if glide else 0.0,
+        floor=o.floor,
+        steps=o.untangle_iter,
+        enough=lambda left, since: (
+            since >= (_FEW_PATIENCE if left <= few and not glide else o.patience)
+        ),
+        linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
+        budget=history.budget,
+        note=note,
+    )
+
+
+def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.intp]:
+    """Tets that are inverted, by exact signs, or lie at a folded boundary face."""
+    stuck = np.zeros(len(model.T), bool)
+    stuck[_core.certificate.not_positive_tets(x, model.T)] = True
+    if glide and model.torus is not None:
+        folded = _core.certificate.torus_graph(x, model.faces, model.torus.R).bad
+        touched = np.ones(len(model.V), bool)
+        touched[model.boundary] = False
+        inside = touched.copy()
+        touched[model.faces[folded]] = True
+        # Of a tet without a boundary face, at least two vertices lie inside.
+        stuck |= (inside[model.T].sum(axis=1) == 1) & touched[model.T].all(axis=1)
+    return np.flatnonzero(stuck)
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Some tets as a problem of their own, all vertices at their rim held.
+
+    Attributes
+    ----------
+    tets : ndarray of intp, shape (p,)
+    vertices : ndarray of intp, shape (q,)
+    motion : ndarray of uint8, shape (q,)
+    """
+
+    tets: NDArray[np.intp]
+    vertices: NDArray[np.intp]
+    motion: NDArray[np.uint8]
+
+
+def patches_round(
+    model: SolidModel, tets: NDArray[np.intp], rings: int, *, glide: bool
+) -> list[Patch]:
+    """Patches that reach ``rings`` further than some tets; those that overlap are united."""
+    T, motion = model.T, model.motion(glide=glide)
+    near = np.zeros(len(model.V), bool)
+    near[T[tets]] = True
+    for _ in range(rings):
+        near[T[near[T].any(axis=1)]] = True
+    free = near & (motion != FIXED)
+    rows = np.flatnonzero(free[T].any(axis=1))
+    corners = T[rows]
+    inside = free[corners]
+    owner = np.broadcast_to(np.arange(len(rows))[:, None], corners.shape)[inside]
+    size = (len(rows), len(model.V))
+    links = coo_matrix((np.ones(len(owner), np.int8), (owner, corners[inside])), shape=size).tocsr()
+    count, label = connected_components(links @ links.T, directed=False)
+    found = []
+    for part in range(count):
+        members = rows[label == part]
+        vertices = np.unique(T[members])
+        found.append(Patch(members, vertices, np.where(free[vertices], motion[vertices], FIXED)))
+    return found
+
+
+def untangle_patches(
+    model: SolidModel,
+    x: NDArray[np.float64],
+    stuck: NDArray[np.intp],
+    *,
+    rings: int,
+    glide: bool,
+    budget: Budget,
+) -> NDArray[np.float64]:
+    """Untangle the surroundings of some tets, all other vertices held.
+
+    Parameters
+    ----------
+    model : SolidModel
+    x : ndarray, shape (n, 3)
+    stuck : ndarray of intp
+        Tets.
+    rings : int
+        Rings of vertices round them that may move.
+    glide : bool
+    budget : Budget
 
     Returns
     -------
-    solver : FlipFreeSolver
-        Of the solid refined, with the same history.
-    refinement : Refinement
-        Of the same input.
-    x : ndarray, shape (n', 3)
-    left : int
-        What could not be untangled all the same.
+    ndarray, shape (n, 3)
+        With fewer inverted tets, if anything changed.
     """
-    few = 0 if glide else int(_FEW * len(solver.T))
-    x, left = solver.untangle(x, glide=glide, few=few)
-    best = solver, refinement, x, left
-    for _ in range(_ROUNDS):
-        inverted = np.flatnonzero(~(_core.volume.signed_tet_volumes(x, solver.T) > 0.0))
-        if not 0 < len(inverted) <= _MOST_STUCK * len(solver.T):
-            break
-        n, passes = refinement.solid.n_vertices, len(refinement.halved)
-        refinement = refinement.halve(crowded_edges(refinement.solid, inverted))
-        solid, V = refinement.solid, solver.V
-        for ends in refinement.halved[passes:]:
-            V, x = (np.concatenate([at, at[ends].mean(axis=1)]) for at in (V, x))
-        _log.info(
-            "%d inverted tets are stuck: %d edges round them halved",
-            len(inverted), solid.n_vertices - n,
-        )  # fmt: skip
-        solver = dataclasses.replace(solver, V=V, T=solid.T)
-        x, left = solver.untangle(x, glide=glide, few=few)
-        if left < best[-1]:
-            best = solver, refinement, x, left
-        elif left > _TIMES * best[-1] + _MORE:
-            break
-    return best
+    o = model.options
+    x = x.copy()
+    for patch in patches_round(model, stuck, rings, glide=glide):
+        number = np.full(len(model.V), -1, np.int32)
+        number[patch.vertices] = np.arange(len(patch.vertices))
+        boundary = None
+        if glide:
+            moving = np.zeros(len(model.V), bool)
+            moving[patch.vertices] = patch.motion == GLIDING
+            faces = model.faces[moving[model.faces].any(axis=1)]
+            if len(faces):
+                boundary = model.gliding(faces, number)
+        weights = model.shares[patch.tets]
+        start = np.ascontiguousarray(x[patch.vertices])
+        newton = _core.volume.SolidNewton(
+            start,
+            tets=np.ascontiguousarray(number[model.T[patch.tets]]),
+            rest=np.ascontiguousarray(model.rest[patch.tets]),
+            weights=weights / weights.sum(),
+            motion=patch.motion.astype(np.uint8),
+            boundary=boundary,
+        )
+        newton.set_targets(model.local_volumes[patch.tets])
+        done = _continue(
+            newton,
+            start,
+            face=o.face_weight if boundary is not None else 0.0,
+            floor=o.floor,
+            steps=_PATCH_STEPS,
+            enough=lambda left, since: since >= _PATCH_PATIENCE,
+            linear=_core.volume.NewtonOptions(tol=1e-2, max_cg=o.max_cg),
+            budget=budget,
+        )
+        x[patch.vertices] = done.x
+    return x

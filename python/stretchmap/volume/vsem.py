@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from dataclasses import dataclass
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress, report
 from ..maps.history import IterationRecord
+from .options import VolumeOptions
+from .problem import Outcome, VolumeProblem
 
-__all__ = ["VsemRun", "minimize_volumetric_stretch"]
+__all__ = ["VsemRun", "minimize_volumetric_stretch", "run_vsem"]
 
 # Relative residuals asked of the linear solves. A step starts from the last one's solution, and
 # what it leaves open the next one makes good; the less the last step changed the energy, the more
@@ -133,3 +136,30 @@ def minimize_volumetric_stretch(
         if before - energy <= tol * energy:
             return VsemRun(x, tuple(history), True, "the energy stopped decreasing")
     return VsemRun(x, tuple(history), False, "most iterations done")
+
+
+def run_vsem(
+    problem: VolumeProblem,
+    options: VolumeOptions,
+    *,
+    c: float,
+    max_iter: int | None,
+    progress: Progress | None,
+) -> Outcome:
+    """Algorithm 5.1 on a problem; 20 steps unless told otherwise."""
+    clock = time.perf_counter()
+    fixed = np.zeros(problem.solid.n_vertices, np.uint8)
+    fixed[problem.solid.boundary_vertices] = 1
+    run = minimize_volumetric_stretch(
+        problem.V, problem.solid.T, fixed, problem.x, c=c,
+        max_iter=20 if max_iter is None else max_iter,
+        tol=1e-6 if options.tol is None else options.tol,
+        harmonic=not problem.warm, solver=options.solver, progress=progress,
+    )  # fmt: skip
+    return Outcome(
+        dataclasses.replace(problem, x=run.image),
+        run.history,
+        run.converged,
+        run.stop_reason,
+        {"vsem": time.perf_counter() - clock},
+    )

@@ -107,9 +107,7 @@ def test_histograms_hold_every_element_and_name_both_maps(volume):
 
 def test_ratios_before_are_those_of_the_harmonic_map(volume):
     before, name = ratios_before(volume)
-    frozen = sm.volume_map(
-        volume.mesh, c=0.0, max_iter=0, start=volume.image, torus=volume.torus
-    ).distortion
+    frozen = sm.volume_map(volume.mesh, c=0.0, max_iter=0, start=volume).distortion
     assert name == "harmonic map"
     assert np.average(before, weights=volume.mesh.tet_volumes) == pytest.approx(1.0)
     # With no step at all the map is what we gave, not the harmonic one, which preserves less.

@@ -98,7 +98,7 @@ def face_case(folded):
         angles[2] = [0.45, 0.35]
     faces = np.array([[0, 1, 2]], np.int32)
     rest = _core.volume.rest_triangles(
-        np.array([[0.0, 0, 0], [0.5, 0.1, 0], [0.1, 0.4, 0.2]]), faces, 1.1
+        np.array([[0.0, 0, 0], [0.5, 0.1, 0], [0.1, 0.4, 0.2]]), faces, 1.1, 6.0
     )
     return R, r, angles, faces, rest
 
@@ -151,15 +151,24 @@ def test_newton_steps_reach_a_critical_point(glide):
     x[inner] += 0.01 * r * RNG.standard_normal((len(inner), 3))
     shares = solid.tet_volumes / solid.volume
     faces = solid.boundary_vertices[solid.surface.F]
-    face_rest = _core.volume.rest_triangles(V, faces, 1.0)
+    boundary = _core.volume.GlidingBoundary(
+        surface=_core.volume.TorusSurface(R, r),
+        faces=faces,
+        rest=_core.volume.rest_triangles(V, faces, 1.0, 6.0),
+        weights=np.full(len(faces), 1.0 / len(faces)),
+    )
     newton = _core.volume.SolidNewton(
-        T, _core.volume.rest_matrices(V, T, 6.0), shares, motion, R, r, x, faces, face_rest,
-        np.full(len(faces), 1.0 / len(faces)),
-    )  # fmt: skip
+        x,
+        tets=T,
+        rest=_core.volume.rest_matrices(V, T, 6.0),
+        weights=shares,
+        motion=motion,
+        boundary=boundary,
+    )
     w = _core.volume.EnergyWeights(1.0, 3.0, 0.0, 1.0 if glide else 0.0)
-    moved, report = newton.step(x, w, 1e-10, 2000)
+    moved, report = newton.step(x, w, _core.volume.NewtonOptions(tol=1e-10, max_cg=2000))
     assert report.alpha >= 1.0 and report.after.energy < report.before.energy
     # Repeated steps converge to a point where the gradient vanishes.
     for _ in range(60):
-        moved, report = newton.step(moved, w, 1e-8, 2000)
+        moved, report = newton.step(moved, w, _core.volume.NewtonOptions(tol=1e-8, max_cg=2000))
     assert report.decrement < 1e-9 * report.before.energy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from itertools import pairwise
 
@@ -12,7 +13,7 @@ import scipy.sparse as sp
 
 import stretchmap as sm
 from stretchmap import _core, samples
-from stretchmap.errors import DegenerateError, OptionError
+from stretchmap.errors import DegenerateError, KindError, OptionError
 from stretchmap.mesh.meshes import TetMesh
 from stretchmap.volume import vsem
 
@@ -185,7 +186,7 @@ def test_vsem_step_solves_the_paper_system(bumpy, c):
 
 
 def test_vsem_energy_falls_at_every_step_and_flips_are_reported(bumpy):
-    result = sm.volume_map(bumpy, c=0.0, max_iter=8, tol=0.0)
+    result = sm.volume_map(bumpy, c=0.0, max_iter=8, options=sm.VolumeOptions(tol=0.0))
     energies = [record.energy for record in result.history]
     assert all(b < a for a, b in pairwise(energies))
     volumes = _core.volume.signed_tet_volumes(np.ascontiguousarray(result.image), bumpy.T)
@@ -206,7 +207,7 @@ def test_a_large_run_says_how_much_memory_it_needs(bumpy, caplog, monkeypatch):
 
 def test_solvers_agree(bumpy):
     images = [
-        sm.volume_map(bumpy, c=10.0, max_iter=5, solver=solver).image
+        sm.volume_map(bumpy, c=10.0, max_iter=5, options=sm.VolumeOptions(solver=solver)).image
         for solver in ("direct", "multigrid")
     ]
     assert np.abs(images[0] - images[1]).max() < 1e-6 * np.abs(images[0]).max()
@@ -244,7 +245,7 @@ def test_going_on_from_a_saved_map_lowers_the_distortion_further(bumpy, tmp_path
     first = sm.volume_map(bumpy, max_iter=12)
     first.save(tmp_path / "map.npz")
     loaded = load_map(tmp_path / "map.npz")
-    again = sm.volume_map(loaded.mesh, start=loaded.image, torus=loaded.torus)
+    again = sm.volume_map(loaded.mesh, start=loaded)
     assert again.certificate.certified
     assert again.distortion.element_error_mean < first.distortion.element_error_mean
     assert {record.stage for record in again.history} == {"glide", "equalize"}
@@ -253,18 +254,19 @@ def test_going_on_from_a_saved_map_lowers_the_distortion_further(bumpy, tmp_path
 def test_a_tangled_start_is_untangled(bumpy):
     good = sm.volume_map(bumpy, boundary="frozen", max_iter=6)
     inner = np.setdiff1d(np.arange(bumpy.n_vertices), bumpy.boundary_vertices)
-    start = good.image.copy()
-    start[inner] += 0.15 * good.torus.r * RNG.standard_normal((len(inner), 3))
-    flips = np.count_nonzero(_core.volume.signed_tet_volumes(start, bumpy.T) <= 0.0)
+    image = good.image.copy()
+    image[inner] += 0.15 * good.torus.r * RNG.standard_normal((len(inner), 3))
+    flips = np.count_nonzero(_core.volume.signed_tet_volumes(image, bumpy.T) <= 0.0)
     assert flips > 10
-    again = sm.volume_map(bumpy, start=start, torus=good.torus, max_iter=2)
+    start = dataclasses.replace(good, image=image)
+    again = sm.volume_map(bumpy, start=start, max_iter=2)
     assert again.certificate.certified
     assert any(record.stage == "untangle" for record in again.history)
 
 
 def test_ring_volumes_can_be_made_exact(bumpy):
     plain = sm.volume_map(bumpy, max_iter=20)
-    exact = sm.volume_map(bumpy, max_iter=20, vertex_exact=True)
+    exact = sm.volume_map(bumpy, max_iter=20, options=sm.VolumeOptions(vertex_exact=True))
     assert exact.vertex_exact and exact.certificate.certified
     inner = np.setdiff1d(np.arange(bumpy.n_vertices), bumpy.boundary_vertices)
     assert np.abs(exact.distortion.ring_ratios[inner] - 1.0).max() < 1e-9
@@ -275,7 +277,7 @@ def test_ring_volumes_can_be_made_exact(bumpy):
 def test_refinement_is_reported_or_refused(load_solid):
     solid = load_solid("kitten_jigsaw_small")
     with pytest.raises(DegenerateError) as caught:
-        sm.volume_map(solid, refine=False)
+        sm.volume_map(solid, options=sm.VolumeOptions(refine=False))
     assert caught.value.ids
     result = sm.volume_map(solid, max_iter=3)
     assert result.certificate.certified
@@ -307,10 +309,33 @@ def test_renumbering_rotating_and_scaling_the_input_changes_nothing(bumpy):
         {"c": -1.0},
         {"c": float("nan")},
         {"max_iter": -1},
-        {"tol": -1.0},
-        {"start": np.zeros((3, 3))},
+        {"c": 1.0, "options": sm.VolumeOptions(vertex_exact=True)},
     ],
 )
 def test_bad_options_are_named(bumpy, options):
     with pytest.raises(OptionError):
         sm.volume_map(bumpy, **options)
+
+
+def test_a_start_of_another_mesh_is_refused(bumpy):
+    other = sm.area_map(samples.torus_surface(12, 8))
+    with pytest.raises(KindError, match="another mesh"):
+        sm.volume_map(bumpy, start=other)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("floor", 2.0),
+        ("patience", 0),
+        ("untangle_iter", 1.5),
+        ("time_limit", float("inf")),
+        ("glide_tol", float("nan")),
+        ("growth", "fast"),
+        ("solver", "magic"),
+        ("phase", float("inf")),
+    ],
+)
+def test_options_name_what_they_may_be(name, value):
+    with pytest.raises(OptionError, match=f"{name} must be"):
+        sm.VolumeOptions(**{name: value})

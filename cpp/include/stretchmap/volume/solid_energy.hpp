@@ -3,9 +3,9 @@
 //   Psi(x) = sum_t weight_t psi(J_t) + face * (energy of the gliding boundary triangles),
 //   J_t    = [x1 - x0, x2 - x0, x3 - x0] * rest_t,
 //
-// with psi of element_energy.hpp. Each vertex is free, fixed, or glides on the torus. A gliding
-// vertex has two unknowns, arc length along the two coordinate circles through it; its block is
-// written in the frame (e_u, e_v, normal) with the third unknown absent (identity row).
+// with psi of element_energy.hpp. Each vertex is free, fixed, or glides on a surface. A gliding
+// vertex has two unknowns, along the first two axes of its frame there; its block is written in
+// that frame with the third unknown absent (identity row).
 //
 // Every block row is summed by one thread over its tets in a fixed order: same bits for any number
 // of threads. Rows are numbered along a space-filling curve.
@@ -30,14 +30,17 @@ struct EnergyReport {
   Index folds = 0;          // faces with one that is not positive
 };
 
+struct SolidElements {
+  TetsRef tets;     // (k, 4)
+  RowsRef rest;     // (k, 9) row-major 3x3 matrices
+  VecRef weights;   // (k) > 0
+  FlagsRef motion;  // (n) of Motion values
+};
+
 class SolidEnergy {
  public:
-  // barrier: faces whose vertices all glide; may be empty.
-  // tets (k, 4), rest (k, 9) row-major 3x3 matrices, weights (k) > 0, motion (n) of Motion values,
-  // R and r the radii of the torus (only used by gliding vertices), x (n, 3) to number rows by.
-  SolidEnergy(const TetsRef& tets, const RowsRef& rest, const VecRef& weights,
-              const FlagsRef& motion, double R, double r, const PointsRef& x,
-              BoundaryBarrier barrier = {});
+  // boundary: needed where vertices glide. x (n, 3) is there to number rows by.
+  SolidEnergy(const SolidElements& elements, const PointsRef& x, GlidingBoundary boundary = {});
 
   Index tets() const { return static_cast<Index>(tets_.rows()); }
   Index rows() const { return static_cast<Index>(row_vertex_.size()); }
@@ -54,18 +57,24 @@ class SolidEnergy {
   void linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
                  linalg::BlockMatrix* hessian) const;
 
-  // x moved by alpha * step (rows, 3); gliding vertices stay on the torus.
+  // x moved by alpha * step (rows, 3); gliding vertices stay on their surface.
   Points move(const PointsRef& x, const PointsRef& step, double alpha) const;
 
   // Largest alpha <= 1 for which no tet that is positive at x turns over along the straight line
   // of the step, times 0.9.
   double longest_step(const PointsRef& x, const PointsRef& step) const;
 
+  // The step, shortened at the vertices of those tets that would turn over first, so that a handful
+  // of them does not hold up all others.
+  Points held_back(const PointsRef& x, const PointsRef& step) const;
+
   // Three translations as seen from the vertex frames, (3 rows, 3).
   Rows near_nullspace(const PointsRef& x) const;
 
  private:
   Eigen::Matrix3d frame(const PointsRef& x, Index vertex) const;
+  Points in_space(const PointsRef& x, const PointsRef& step) const;  // (n, 3) of a step in frames
+  Vec longest_steps(const PointsRef& x, const PointsRef& direction) const;  // of every tet
   // visit(t, lane, batch) for the tets t = item(p), p in [first, last), after evaluate(batch, w).
   template <class Item, class Visit>
   void for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
@@ -85,7 +94,6 @@ class SolidEnergy {
   Rows rest_;
   Vec weights_;
   Flags motion_;
-  double R_, r_;
   BoundaryBarrier barrier_;
   IndexVec row_vertex_;          // vertex of each row
   IndexVec vertex_row_;          // row of each vertex, -1 if fixed

@@ -27,6 +27,7 @@ struct NewtonReport {
   int cg_iterations = 0;
   double cg_residual = 0.0;
   bool negative_curvature = false;  // met by the conjugate gradients, which then stopped early
+  double shift = 0.0;  // added to the Hessian's diagonal, as a share of it, before a step was found
 };
 
 class SolidNewton {
@@ -42,22 +43,29 @@ class SolidNewton {
   }
 
   // One inexact Newton step from x (n, 3), which it replaces. The energy never rises, and with
-  // epsilon = 0 no tet turns over.
-  // \throws SolverError if the energy at x is not finite or the linear solve breaks down.
+  // epsilon = 0 no tet turns over. A solve that breaks down, or whose direction does not lead down,
+  // is tried again with a growing diagonal; if nothing helps, x stays and alpha is 0.
+  // \throws SolverError if the energy at x is not finite.
   NewtonReport step(Points& x, const EnergyWeights& w, const NewtonOptions& options,
                     const Poll& poll = {});
 
  private:
+  bool search(Points& x, const Points& direction, const EnergyWeights& w,
+              const NewtonOptions& options, NewtonReport& report);
   void try_double_step(Points& x, const Points& start, const Points& direction,
                        const EnergyWeights& w, NewtonReport& report) const;
+  void try_held_back(Points& x, const Points& start, Points& direction, const EnergyWeights& w,
+                     NewtonReport& report) const;
 
   struct Change {
     Vec step, gradient;
     double inverse;  // 1 / (step . gradient)
   };
 
-  void renew(const PointsRef& x, const EnergyWeights& w, bool keep);
-  Points descend(const NewtonOptions& options, const Poll& poll, NewtonReport& report);
+  bool renew(const PointsRef& x, const EnergyWeights& w, bool keep);
+  bool linearise(const PointsRef& x, const EnergyWeights& w);
+  bool descend(const NewtonOptions& options, const Poll& poll, Points& direction,
+               NewtonReport& report);
 
   SolidEnergy energy_;
   std::unique_ptr<linalg::BlockSolver> solver_;

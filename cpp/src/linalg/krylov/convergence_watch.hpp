@@ -16,7 +16,10 @@ class ConvergenceWatch {
     if (fresh_ <= 0.0) fresh_ = cost;
     worn_ = cost > 1.6 * fresh_;
   }
-  // The last solve cost over 60 percent more per digit than the first one after the setup.
+  // A solve broke down on it.
+  void fail() { worn_ = true; }
+  // The last solve broke down or cost over 60 percent more per digit than the first one after the
+  // setup.
   bool worn() const { return worn_; }
 
  private:

@@ -74,13 +74,21 @@ struct Run {
   double* x;
   std::vector<double>&r, &p, &q;
   std::vector<float>&r_f, &z;
+  double energy_share;
   Scalars<K> goal{};  // squared residual aimed at
   Scalars<K> rr{};
+  Scalars<K> gained{}, last{};  // twice what all steps, and the last, lowered the quadratic by
   PcgResult<K> result{};
+
+  bool done(int k) const {
+    if (!(rr[k] <= goal[k])) return false;
+    return energy_share <= 0.0 || rr[k] == 0.0 ||
+           (gained[k] > 0.0 && result.iterations * last[k] <= energy_share * gained[k]);
+  }
 
   bool reached() const {
     for (int k = 0; k < K; ++k)
-      if (!(rr[k] <= goal[k])) return false;
+      if (!done(k)) return false;
     return true;
   }
 
@@ -106,7 +114,7 @@ struct Run {
       if (!(result.finite = all_finite<K>(pq))) return;
       Scalars<K> alpha{};
       for (int k = 0; k < K; ++k) {
-        if (rr[k] <= goal[k]) continue;  // this column is done and rests
+        if (done(k)) continue;  // this column rests
         if (pq[k] <= 0.0 || rz[k] <= 0.0) {
           result.negative_curvature = true;
           alpha = {};
@@ -116,6 +124,8 @@ struct Run {
           return;
         }
         alpha[k] = rz[k] / pq[k];
+        last[k] = alpha[k] * rz[k];
+        gained[k] += last[k];
       }
       rr = advance<K>(n, alpha, p.data(), q.data(), x, r.data(), r_f.data());
       if (!(result.finite = all_finite<K>(rr))) return;
@@ -133,7 +143,8 @@ PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVect
   const Index n = system.n;
   const std::size_t size = static_cast<std::size_t>(n) * K;
   const Scalars<K> bb = dots<K>(n, b, b);
-  Run<K> run{system, b, x, vectors.r, vectors.p, vectors.q, vectors.r_f, vectors.z};
+  Run<K> run{system,    b,           x,         vectors.r,           vectors.p,
+             vectors.q, vectors.r_f, vectors.z, options.energy_share};
   run.p.assign(size, 0.0);
   for (std::vector<double>* vector : {&run.r, &run.q}) vector->resize(size);
   for (std::vector<float>* vector : {&run.r_f, &run.z}) vector->resize(size);

@@ -1,0 +1,49 @@
+// The surface that boundary vertices glide on, as the optimiser sees it: axes, how they turn, and
+// how a point moves. Nothing else in this folder knows what surface it is.
+#pragma once
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap::volume {
+
+class GlideSurface {
+ public:
+  virtual ~GlideSurface() = default;
+
+  // Orthonormal axes at a point of the surface, as columns: two along it, then the outward normal.
+  virtual Eigen::Matrix3d frame(const Eigen::Vector3d& x) const = 0;
+
+  // Unit vector that points outward; the normal for a point of the surface, and smooth near it, so
+  // that it serves for points of the flat triangles between its vertices, too.
+  virtual Eigen::Vector3d outward(const Eigen::Vector3d& x) const = 0;
+  virtual Eigen::Matrix3d outward_derivative(const Eigen::Vector3d& x) const = 0;
+
+  // Where a point of the surface comes to by a step along the first two axes of its frame.
+  virtual Eigen::Vector3d moved(const Eigen::Vector3d& x, const Eigen::Vector2d& step) const = 0;
+
+  // Second derivatives of `moved` by the step at zero, in the direction g, itself in the frame of
+  // x: what a gradient g adds to the Hessian because the surface is curved.
+  virtual Eigen::Matrix2d bending(const Eigen::Vector3d& x, const Eigen::Vector3d& g) const = 0;
+
+  // Total area, the scale of the boundary's rest triangles.
+  virtual double area() const = 0;
+};
+
+// ((R + r cos v) cos u, (R + r cos v) sin u, r sin v), 0 < r < R. The axes are those of u and v,
+// steps are arc lengths along these two circles, and outward is away from the core circle.
+class TorusSurface final : public GlideSurface {
+ public:
+  TorusSurface(double R, double r);
+
+  Eigen::Matrix3d frame(const Eigen::Vector3d& x) const override;
+  Eigen::Vector3d outward(const Eigen::Vector3d& x) const override;
+  Eigen::Matrix3d outward_derivative(const Eigen::Vector3d& x) const override;
+  Eigen::Vector3d moved(const Eigen::Vector3d& x, const Eigen::Vector2d& step) const override;
+  Eigen::Matrix2d bending(const Eigen::Vector3d& x, const Eigen::Vector3d& g) const override;
+  double area() const override;
+
+ private:
+  double R_, r_;
+};
+
+}  // namespace stretchmap::volume

@@ -1,0 +1,63 @@
+#include "stretchmap/volume/glide_surface.hpp"
+
+#include <cmath>
+
+namespace stretchmap::volume {
+
+using Eigen::Matrix2d;
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+TorusSurface::TorusSurface(double R, double r) : R_(R), r_(r) {}
+
+Matrix3d TorusSurface::frame(const Vector3d& x) const {
+  const double rho = x.head<2>().norm();
+  const double cu = x[0] / rho, su = x[1] / rho;
+  const double v = std::atan2(x[2], rho - R_);
+  const double cv = std::cos(v), sv = std::sin(v);
+  Matrix3d Q;
+  Q.col(0) << -su, cu, 0.0;
+  Q.col(1) << -sv * cu, -sv * su, cv;
+  Q.col(2) << cv * cu, cv * su, sv;
+  return Q;
+}
+
+Vector3d TorusSurface::outward(const Vector3d& x) const {
+  const double share = 1.0 - R_ / x.head<2>().norm();
+  return Vector3d(share * x[0], share * x[1], x[2]).normalized();
+}
+
+Matrix3d TorusSurface::outward_derivative(const Vector3d& x) const {
+  const double rho = x.head<2>().norm(), share = 1.0 - R_ / rho;
+  const Vector3d along(-x[1] / rho, x[0] / rho, 0.0);
+  const Vector3d off(share * x[0], share * x[1], x[2]);
+  const double length = off.norm();
+  const Vector3d n = off / length;
+  return (Matrix3d::Identity() - n * n.transpose()) / length *
+         (Matrix3d::Identity() - R_ / rho * along * along.transpose());
+}
+
+Vector3d TorusSurface::moved(const Vector3d& x, const Vector2d& step) const {
+  const double rho = x.head<2>().norm();
+  const double u = std::atan2(x[1], x[0]) + step[0] / rho;
+  const double v = std::atan2(x[2], rho - R_) + step[1] / r_;
+  const double radius = R_ + r_ * std::cos(v);
+  return {radius * std::cos(u), radius * std::sin(u), r_ * std::sin(v)};
+}
+
+// Of xi along arc length: uu is -radial / rho, vv is -normal / r, uv is -sin(v) e_u / rho, radial
+// being cos(v) normal - sin(v) e_v.
+Matrix2d TorusSurface::bending(const Vector3d& x, const Vector3d& g) const {
+  const double rho = x.head<2>().norm();
+  const double cv = (rho - R_) / r_, sv = x[2] / r_;
+  Matrix2d C;
+  C(0, 0) = -(cv * g[2] - sv * g[1]) / rho;
+  C(1, 1) = -g[2] / r_;
+  C(0, 1) = C(1, 0) = -sv * g[0] / rho;
+  return C;
+}
+
+double TorusSurface::area() const { return 4.0 * EIGEN_PI * EIGEN_PI * R_ * r_; }
+
+}  // namespace stretchmap::volume

@@ -1,0 +1,202 @@
+"""The one way to a certified volume map, whatever holds its boundary.
+
+Start, untangle, minimize with the boundary held, let it glide where it may, and two optional last
+stages. What a stage hands on has no inverted tet; a stage that cannot keep that hands back what it
+was given.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.progress import Progress
+from ..certificate.findings import Certificate
+from ..errors import CertificationError
+from ..mesh.refinement import crowded_edges
+from .equalize import equalize
+from .exact_rings import make_rings_exact
+from .minimize import minimize
+from .model import Budget, History
+from .options import FillOptions, VolumeOptions
+from .problem import Outcome, VolumeProblem
+from .start import started
+from .untangle import stuck_tets, untangle_patches, untangle_whole
+
+__all__ = ["require_certified", "solve"]
+
+_log = logging.getLogger("stretchmap")
+
+_START_TOL = 1e-4
+_LEAST_SECONDS = 10.0  # of processor time, for a small mesh
+_ROUNDS = 12
+_RINGS = (2, 4)  # reach of the patches, to begin with and in later rounds
+# Inverted tets: with a larger share of all, it is not a matter of single places.
+_MOST_STUCK = 0.05
+# Times the fewest so far, and so many more: halving breeds more than it cures.
+_TIMES, _MORE = 2, 100
+
+
+@dataclass
+class _Run:
+    problem: VolumeProblem
+    options: FillOptions
+    history: History
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        return self.problem.x
+
+    @x.setter
+    def x(self, value: NDArray[np.float64]) -> None:
+        self.problem = dataclasses.replace(self.problem, x=value)
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        clock = time.perf_counter()
+        yield
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - clock
+
+
+def solve(
+    problem: VolumeProblem,
+    options: FillOptions,
+    *,
+    glide: bool = False,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Find a map without inverted tets and with little volume distortion.
+
+    Parameters
+    ----------
+    problem : VolumeProblem
+    options : FillOptions
+        `VolumeOptions` if the boundary lies on a torus.
+    glide : bool
+        Whether the boundary may move on the torus.
+    progress : Progress, optional
+    """
+    budget = Budget(max(_LEAST_SECONDS, options.time_limit * problem.solid.n_tets))
+    clock = time.perf_counter()
+    problem = started(problem, solver=options.solver, tol=_START_TOL)
+    run = _Run(problem, options, History(problem.model(options), budget, progress))
+    run.seconds["start"] = time.perf_counter() - clock
+    with run.timed("untangle"):
+        left = _untangle(run, glide=glide)
+    if left:
+        reason = "the time limit was reached; " if budget.spent else ""
+        return _outcome(run, False, f"{reason}{left} tets could not be untangled")
+    converged, reason, newton = _minimize(run, glide=glide)
+    exact = False
+    if problem.torus is not None and isinstance(options, VolumeOptions):
+        with run.timed("equalize"):
+            x = equalize(run.history.model, run.x, run.history, options, glide=glide, newton=newton)
+            _keep(run, x, glide, "volumes along u, v and s left as they were")
+        if options.vertex_exact:
+            with run.timed("exact"):
+                x, why_not = make_rings_exact(
+                    run.history.model, run.x, run.history, options.exact_std_factor
+                )
+            exact = not why_not and _keep(run, x, glide, "ring volumes left as they were")
+            if why_not:
+                _log.warning("ring volumes left as they were: %s", why_not)
+    return _outcome(run, converged, reason, exact)
+
+
+def _outcome(run: _Run, converged: bool, reason: str, exact: bool = False) -> Outcome:
+    return Outcome(run.problem, tuple(run.history.records), converged, reason, run.seconds, exact)
+
+
+def _keep(run: _Run, x: NDArray[np.float64], glide: bool, otherwise: str) -> bool:
+    """Take over ``x``, unless it has an inverted tet or a folded face."""
+    if len(stuck_tets(run.history.model, x, glide=glide)):
+        _log.warning("%s: a tet or a boundary face would turn over", otherwise)
+        return False
+    run.x = x
+    return True
+
+
+def _untangle(run: _Run, *, glide: bool) -> int:
+    """Inverted tets, and tets at folded faces, that are left."""
+    history = run.history
+    run.x = untangle_whole(history.model, run.x, history, glide=False).x
+    if glide:
+        run.x = untangle_whole(history.model, run.x, history, glide=True).x
+    stuck = stuck_tets(history.model, run.x, glide=glide)
+    best, fewest = run.problem, len(stuck)
+    for done in range(_ROUNDS):
+        many = len(stuck) > _MOST_STUCK * run.problem.solid.n_tets
+        if not len(stuck) or many or history.budget.spent:
+            break
+        run.x = untangle_patches(
+            history.model, run.x, stuck, rings=_RINGS[done > 0], glide=glide, budget=history.budget
+        )
+        stuck = stuck_tets(history.model, run.x, glide=glide)
+        if len(stuck) < fewest:
+            best, fewest = run.problem, len(stuck)
+        elif len(stuck) > _TIMES * fewest + _MORE:
+            break
+        if len(stuck) and run.problem.refinement is not None:
+            n = run.problem.solid.n_vertices
+            run.problem = run.problem.halved(crowded_edges(run.problem.solid, stuck))
+            history.model = run.problem.model(run.options)
+            _log.info(
+                "%d inverted tets are stuck: %d edges round them halved",
+                len(stuck), run.problem.solid.n_vertices - n,
+            )  # fmt: skip
+            stuck = stuck_tets(history.model, run.x, glide=glide)
+    if fewest and len(stuck):
+        run.problem = best
+        history.model = best.model(run.options)
+        return fewest
+    # Away from folding: the nearer to it, the shorter are all steps that follow.
+    away = untangle_whole(history.model, run.x, history, glide=glide)
+    if not away.left and not len(stuck_tets(history.model, away.x, glide=glide)):
+        run.x = away.x
+    return 0
+
+
+def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNewton | None]:
+    o, history = run.options, run.history
+    goal = o.frozen_weight if glide else o.volume_weight
+    converged, reason, newton = False, "", None
+    if not (run.problem.warm and glide):
+        with run.timed("frozen"):
+            first = o.volume_weight if run.problem.warm else 1.0
+            done = minimize(history.model, run.x, history, glide=False, start=first, goal=goal)
+        run.x, converged, reason, newton = done.x, done.converged, done.reason, done.newton
+    if glide:
+        with run.timed("glide"):
+            first = o.volume_weight if run.problem.warm else goal
+            done = minimize(
+                history.model, run.x, history, glide=True, start=first, goal=o.volume_weight
+            )
+        converged, reason, newton = done.converged, done.reason, done.newton
+        if not _keep(run, done.x, True, "the map with a held boundary is kept"):
+            return False, "gliding would fold the boundary", None
+    return converged, reason, newton
+
+
+def require_certified(certificate: Certificate, what: str) -> None:
+    """Refuse what is not proven to be a bijection.
+
+    Raises
+    ------
+    CertificationError
+        With the reason, and in ``ids`` the elements at fault.
+    """
+    if not certificate.certified:
+        raise CertificationError(
+            f"{what} is not certified: {certificate.reason}; keep_best=True returns it all the "
+            "same",
+            next(iter(certificate.ids.values()), ()),
+        )

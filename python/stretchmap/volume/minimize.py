@@ -1,0 +1,105 @@
+"""Least volume distortion without a fold: Newton steps behind a barrier.
+
+With lambda the weight of the volume term and 1 that of the shape term, lambda grows by a fixed
+factor after every step that was not cut short, so shape decides early and volume late. The recorded
+energy is the energy divided by lambda: it cannot rise, neither in a step nor when lambda grows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .model import History, SolidModel
+
+__all__ = ["Minimized", "minimize"]
+
+_SERVED = 0.5  # a shorter step shows that a Hessian is too old
+_REST = 6  # steps with a Hessian each after one was too old
+
+
+@dataclass(frozen=True, eq=False)
+class Minimized:
+    """Where the minimization ended.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n, 3)
+    converged : bool
+    reason : str
+    newton : SolidNewton
+        The minimizer, with its last Hessian.
+    """
+
+    x: NDArray[np.float64]
+    converged: bool
+    reason: str
+    newton: _core.volume.SolidNewton
+
+
+def minimize(
+    model: SolidModel,
+    x: NDArray[np.float64],
+    history: History,
+    *,
+    glide: bool,
+    start: float,
+    goal: float,
+) -> Minimized:
+    """Newton steps with lambda growing from ``start`` to ``goal``; no tet turns over.
+
+    Parameters
+    ----------
+    model : SolidModel
+    x : ndarray, shape (n, 3)
+        Without inverted tets and, if ``glide``, folded boundary faces.
+    history : History
+        Gets a record per step, of the stage ``"glide"`` or ``"frozen"``.
+    glide : bool
+        Whether boundary vertices move on the torus.
+    start, goal : float
+    """
+    o = model.options
+    stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
+    tolerance = o.glide_tol if glide else o.frozen_tol
+    face = o.face_weight if glide else 0.0
+    newton = model.newton(x, glide=glide)
+    if not glide:
+        newton.set_targets(model.targets)
+    weight, kept, rest = start, 0, 0
+    for iteration in range(1, total + 1):
+        if history.budget.spent:
+            return Minimized(x, False, "the time limit was reached", newton)
+        weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
+        linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=kept > 0)
+        x, step = newton.step(x, weights, linear)
+        before, after = step.before.energy / weight, step.after.energy / weight
+        history.add(
+            stage, iteration, x, energy=after, step=step.alpha, residual=step.decrement, total=total
+        )
+        # A step that few tets cut short, or from a poor solve, gains little and proves nothing.
+        predicted = 0.5 * step.decrement / weight
+        small = max(before - after, predicted) <= tolerance * before and not step.negative_curvature
+        if weight < goal:
+            if step.alpha >= 0.5:
+                weight = min(goal, o.growth * weight)
+            elif step.alpha == 0.0:
+                return Minimized(
+                    x, False, f"no step lowers the energy at lambda = {weight:g}", newton
+                )
+        elif goal < o.volume_weight:
+            return Minimized(x, True, "goal reached", newton)  # only a start for the next stage
+        elif small and kept == 0:
+            return Minimized(x, True, "the energy stopped decreasing", newton)
+        else:
+            # At the last weight the Hessian changes little: a few steps share one, as long as it
+            # serves. Whether to stop is for a renewed one to say.
+            if kept and step.alpha < _SERVED:
+                rest = _REST
+            elif not kept:
+                rest = max(rest - 1, 0)
+            kept = 0 if small or rest or step.alpha < _SERVED else (kept + 1) % o.shared
+    return Minimized(x, False, "most iterations done", newton)

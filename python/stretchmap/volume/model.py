@@ -1,0 +1,205 @@
+"""What all stages of the flip-free optimization share: the solid, its rest shapes, its boundary."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..base.progress import Progress, report
+from ..base.torus import Torus
+from ..maps.history import IterationRecord
+from .options import FillOptions
+
+__all__ = ["Budget", "History", "SolidModel", "face_areas"]
+
+FREE, FIXED, GLIDING = 0, 1, 2
+_REACH = 8.0  # factor up to which the volume next to a boundary face may be off what it expects
+
+
+@dataclass(frozen=True, eq=False)
+class SolidModel:
+    """A solid and what is asked of its image, on the scale of the image.
+
+    Attributes
+    ----------
+    V : ndarray, shape (n, 3)
+        Source positions, scaled to the volume of the image.
+    T : ndarray of int32, shape (k, 4)
+    boundary : ndarray of int32, shape (nb,)
+        Boundary vertices.
+    faces : ndarray of int32, shape (m, 3)
+        Boundary faces in solid vertex ids.
+    options : FillOptions
+    torus : Torus or None
+        What the boundary may glide on; None where it is prescribed.
+    scale : ndarray, shape (n,), or None
+        Logarithm of the length an image piece may be expected to have, relative to its source: what
+        the boundary image has there, spread inside. None: 0 everywhere.
+    """
+
+    V: NDArray[np.float64]
+    T: NDArray[np.int32]
+    boundary: NDArray[np.int32]
+    faces: NDArray[np.int32]
+    options: FillOptions
+    torus: Torus | None = None
+    scale: NDArray[np.float64] | None = None
+
+    @cached_property
+    def shares(self) -> NDArray[np.float64]:
+        """Source volumes of the tets, summing to 1: (k,)."""
+        volumes = _core.volume.signed_tet_volumes(self.V, self.T)
+        shares: NDArray[np.float64] = volumes / volumes.sum()
+        return shares
+
+    @cached_property
+    def rings(self) -> NDArray[np.float64]:
+        """Source volumes round the vertices, a share of the whole each: (n,)."""
+        return _core.measures.ring_sums(self.T, self.shares, len(self.V))
+
+    @cached_property
+    def rest(self) -> NDArray[np.float64]:
+        """Rest matrices (k, 9)."""
+        return _core.volume.rest_matrices(self.V, self.T, self.options.max_aspect)
+
+    @cached_property
+    def local_volumes(self) -> NDArray[np.float64]:
+        """Volume each tet may be expected to get, relative to its source; 1 on the whole: (k,)."""
+        if self.scale is None:
+            return np.ones(len(self.T))
+        volumes = np.exp(3.0 * self.scale[self.T].mean(axis=1))
+        local: NDArray[np.float64] = volumes / float(self.shares @ volumes)
+        return local
+
+    @cached_property
+    def targets(self) -> NDArray[np.float64]:
+        """Volume to ask of each tet behind a held boundary, relative to its share: (k,).
+
+        1 as far as the boundary allows. Where it squeezes or stretches a region so far that the
+        volumes next to it are off by more than a factor anyway, that factor is asked for.
+        """
+        log = np.log(self.local_volumes)
+        targets = np.exp(np.sign(log) * np.maximum(np.abs(log) - math.log(_REACH), 0.0))
+        asked: NDArray[np.float64] = targets / float(self.shares @ targets)
+        return asked
+
+    def gliding(
+        self, faces: NDArray[np.int32], number: NDArray[np.int32] | None = None
+    ) -> _core.volume.GlidingBoundary:
+        """The torus and the rest shapes of boundary faces (m, 3), whose vertices are renumbered."""
+        assert self.torus is not None
+        surface = _core.volume.TorusSurface(self.torus.R, self.torus.r)
+        rest = _core.volume.rest_triangles(
+            self.V, faces, surface.area / self._source_area, self.options.max_aspect
+        )
+        return _core.volume.GlidingBoundary(
+            surface=surface,
+            faces=faces if number is None else number[faces],
+            rest=rest,
+            weights=face_areas(self.V, faces) / self._source_area,
+        )
+
+    @cached_property
+    def _source_area(self) -> float:
+        return float(face_areas(self.V, self.faces).sum())
+
+    def motion(self, *, glide: bool) -> NDArray[np.uint8]:
+        """Which vertices are free, fixed, or glide: (n,)."""
+        motion = np.full(len(self.V), FREE, np.uint8)
+        motion[self.boundary] = GLIDING if glide else FIXED
+        return motion
+
+    def newton(self, x: NDArray[np.float64], *, glide: bool) -> _core.volume.SolidNewton:
+        """The minimizer of the distortion of all tets, started near ``x``."""
+        return _core.volume.SolidNewton(
+            x,
+            tets=self.T,
+            rest=self.rest,
+            weights=self.shares,
+            motion=self.motion(glide=glide),
+            boundary=self.gliding(self.faces) if glide else None,
+        )
+
+
+def face_areas(V: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Areas (m,) of triangles."""
+    corners = V[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas: NDArray[np.float64] = 0.5 * np.linalg.norm(normals, axis=1)
+    return areas
+
+
+class Budget:
+    """Processor time, of all threads, that may be spent.
+
+    Parameters
+    ----------
+    seconds : float
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._end = time.process_time() + seconds
+
+    @property
+    def spent(self) -> bool:
+        """Whether there is none left."""
+        return time.process_time() >= self._end
+
+
+@dataclass
+class History:
+    """Records of the steps of all stages, who is told of them, and how long there is for them."""
+
+    model: SolidModel
+    budget: Budget
+    progress: Progress | None = None
+    records: list[IterationRecord] = field(default_factory=list)
+    _clock: float = field(default_factory=time.perf_counter)
+    _stage: str = ""
+
+    def add(
+        self,
+        stage: str,
+        iteration: int,
+        x: NDArray[np.float64],
+        *,
+        energy: float,
+        step: float,
+        residual: float,
+        total: int,
+    ) -> IterationRecord:
+        """Measure ``x`` and note the step that led there; ``iteration`` 1 starts the clock."""
+        model = self.model
+        if stage != self._stage:
+            self._stage, self._clock = stage, time.perf_counter()
+        volumes = _core.volume.signed_tet_volumes(x, model.T)
+        shares = volumes / volumes.sum()
+        rings = _core.measures.ring_sums(model.T, shares, len(model.V))
+        record = IterationRecord(
+            stage=stage,
+            iteration=iteration,
+            energy=energy,
+            step=step,
+            residual=residual,
+            flips=int(np.count_nonzero(~(volumes > 0.0))),
+            ring_std=float((rings / model.rings).std()),
+            element_std=float((shares / model.shares).std()),
+            seconds=time.perf_counter() - self._clock,
+        )
+        self.records.append(record)
+        report(
+            self.progress,
+            stage,
+            iteration,
+            total,
+            flips=record.flips,
+            element_std=record.element_std,
+        )
+        return record
