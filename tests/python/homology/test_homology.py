@@ -167,6 +167,7 @@ def test_linking_numbers_of_random_polygons(seed):
     assert _core.testing.linking_number(p[::-1].copy(), q) == -number
 
 
+@pytest.mark.timing
 def test_linking_numbers_of_long_polygons():
     """All pairs of 1e5 by 1e5 segments would take minutes."""
     n = 100_000

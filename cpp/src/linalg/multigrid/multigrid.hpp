@@ -3,24 +3,11 @@
 
 #include <vector>
 
+#include "linalg/multigrid/dense_inverse.hpp"
 #include "linalg/multigrid/level_matrix.hpp"
 #include "linalg/multigrid/transfer.hpp"
 
 namespace stretchmap::linalg {
-
-// The coarsest matrix, inverted.
-class DenseInverse {
- public:
-  // A in compressed rows with B x B blocks; a matrix that is not positive definite is replaced by
-  // the one with the absolute values of its eigenvalues.
-  void set(const Pattern& pattern, const std::vector<double>& values, int block);
-  template <int N>
-  void apply(const float* b, float* x) const;
-
- private:
-  Index n_ = 0;
-  std::vector<float> inverse_;
-};
 
 template <int B, int K>
 struct Level {
@@ -59,7 +46,6 @@ class Multigrid {
   double operator_complexity() const;      // numbers stored on all levels over the finest's
 
  private:
-  void set_values(bool fresh);
   Level<B, K> finest_;
   std::vector<Level<K, K>> coarse_;
   Pattern last_pattern_;

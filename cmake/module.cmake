@@ -1,0 +1,16 @@
+# The extension module: converts and forwards, so link-time optimization would gain nothing and cost
+# every rebuild ten seconds.
+find_package(pybind11 CONFIG REQUIRED)
+file(GLOB binding_sources CONFIGURE_DEPENDS cpp/bindings/*.cpp)
+pybind11_add_module(_core NO_EXTRAS ${binding_sources})
+target_link_libraries(_core PRIVATE stretchmap_core)
+target_compile_options(_core PRIVATE ${warnings} ${strict})
+target_precompile_headers(_core PRIVATE cpp/bindings/arrays.hpp)
+if(STRETCHMAP_INPLACE)
+  set_target_properties(_core PROPERTIES LIBRARY_OUTPUT_DIRECTORY
+                                         "${CMAKE_SOURCE_DIR}/python/stretchmap")
+endif()
+install(TARGETS _core LIBRARY DESTINATION stretchmap COMPONENT python)
+# What a build that is not in place needs to be imported: cmake --install build/debug --prefix <folder>
+install(DIRECTORY python/ DESTINATION . COMPONENT package
+        FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed")

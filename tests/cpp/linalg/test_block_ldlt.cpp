@@ -1,0 +1,74 @@
+// The factorization of surface Newton systems against a general sparse one.
+#include <doctest/doctest.h>
+
+#include <Eigen/SparseLU>
+#include <random>
+#include <vector>
+
+#include "stretchmap/base/errors.hpp"
+#include "stretchmap/linalg/block_ldlt.hpp"
+#include "support/shapes.hpp"
+
+TEST_SUITE_BEGIN("linalg");
+
+namespace {
+
+using namespace stretchmap;
+
+// Full blocks on the pattern of a torus; the last unknown of each block a multiplier or not.
+SparseMatrix block_system(int block, bool quasi_definite) {
+  const Faces faces = tests::wavy_torus(9, 7).topology.faces;
+  const int size = 3 * block;
+  std::mt19937 engine(6);
+  std::normal_distribution<double> normal;
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  for (Index f = 0; f < faces.rows(); ++f) {
+    Eigen::MatrixXd half(size, size);
+    for (Index k = 0; k < half.size(); ++k) half.data()[k] = normal(engine);
+    const Eigen::MatrixXd part = half * half.transpose();
+    for (int a = 0; a < size; ++a) {
+      for (int b = 0; b < size; ++b) {
+        const int multipliers =
+            quasi_definite ? int(a % block == block - 1) + int(b % block == block - 1) : 0;
+        const double factor = multipliers == 2 ? -1e-4 : multipliers == 1 ? 3.0 : 1.0;
+        entries.emplace_back(block * faces(f, a / block) + a % block,
+                             block * faces(f, b / block) + b % block, factor * part(a, b));
+      }
+    }
+  }
+  const Index n = block * (faces.maxCoeff() + 1);
+  SparseMatrix matrix(n, n);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+template <int K>
+void check_against_lu(bool quasi_definite) {
+  const SparseMatrix matrix = block_system(K, quasi_definite);
+  const Points normal = tests::random_points(static_cast<Index>(matrix.rows()), 9);
+  const Vec right = normal.col(0);
+  linalg::BlockLdlt<K> factor(matrix);
+  factor.factorise(matrix);
+  Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix);
+  const Vec expected = lu.solve(right);
+  CHECK((factor.solve(right) - expected).cwiseAbs().maxCoeff() <
+        1e-8 * expected.cwiseAbs().maxCoeff());
+}
+
+}  // namespace
+
+TEST_CASE("blocks of two and three unknowns, definite and quasi-definite, are solved") {
+  for (const bool quasi_definite : {false, true}) {
+    check_against_lu<2>(quasi_definite);
+    check_against_lu<3>(quasi_definite);
+  }
+}
+
+TEST_CASE("a singular pivot is an error") {
+  SparseMatrix matrix = block_system(2, false);
+  matrix.coeffs().setZero();
+  linalg::BlockLdlt<2> factor(matrix);
+  CHECK_THROWS_AS(factor.factorise(matrix), Error);
+}
+
+TEST_SUITE_END();

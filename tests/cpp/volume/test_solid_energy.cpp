@@ -1,0 +1,91 @@
+// The assembled energy of a solid: derivatives, and faces whose vertices do not move.
+#include <doctest/doctest.h>
+
+#include <memory>
+
+#include "stretchmap/mesh/tet_boundary.hpp"
+#include "stretchmap/volume/rest_shape.hpp"
+#include "stretchmap/volume/solid_energy.hpp"
+#include "support/differences.hpp"
+#include "support/shapes.hpp"
+
+TEST_SUITE_BEGIN("volume");
+
+namespace {
+
+using namespace stretchmap;
+using volume::EnergyWeights;
+using volume::GlidingBoundary;
+using volume::SolidEnergy;
+
+GlidingBoundary boundary_of(const tests::Solid& solid) {
+  const Index n = static_cast<Index>(solid.points.rows());
+  const mesh::TetBoundary boundary = mesh::tet_boundary(solid.tets, n);
+  Faces faces = boundary.faces;
+  for (Index i = 0; i < faces.size(); ++i) faces.data()[i] = boundary.vertices[faces.data()[i]];
+  const Rows rest = volume::rest_triangles(solid.source, faces, 1.0, 1e6);
+  const auto torus = std::make_shared<const volume::TorusSurface>(solid.R, solid.r);
+  return {torus, faces, rest, Vec::Ones(faces.rows())};
+}
+
+SolidEnergy energy_of(const tests::Solid& solid, const Flags& motion,
+                      GlidingBoundary boundary = {}) {
+  const Rows rest = volume::rest_matrices(solid.source, solid.tets, 6.0);
+  const Vec weights = Vec::Ones(solid.tets.rows());
+  return SolidEnergy({solid.tets, rest, weights, motion}, solid.points, std::move(boundary));
+}
+
+// The standard solid with its interior vertices shaken.
+Points shaken(const tests::Solid& solid, double size) {
+  Points x = solid.points + size * tests::random_points(static_cast<Index>(solid.points.rows()), 4);
+  for (Index i = 0; i < x.rows(); ++i)
+    if (solid.boundary[i]) x.row(i) = solid.points.row(i);
+  return x;
+}
+
+// Boundary vertices fixed, gliding, or by turns one and the other.
+Flags motion_of(const tests::Solid& solid, int fixed_every) {
+  Flags motion = Flags::Zero(solid.boundary.size());
+  int seen = 0;
+  for (Index i = 0; i < motion.size(); ++i)
+    if (solid.boundary[i])
+      motion[i] = fixed_every > 0 && seen++ % fixed_every == 0 ? volume::kFixed : volume::kGliding;
+  return motion;
+}
+
+}  // namespace
+
+TEST_CASE("faces whose vertices are fixed change no derivative") {
+  const tests::Solid solid = tests::solid_torus(600);
+  const Flags motion = motion_of(solid, 1);
+  const SolidEnergy with = energy_of(solid, motion, boundary_of(solid));
+  const SolidEnergy without = energy_of(solid, motion);
+  const Points x = shaken(solid, 1e-2);
+  Points gradient, same;
+  linalg::BlockMatrix hessian = with.pattern(), model = without.pattern();
+  const EnergyWeights weights{1.0, 1.0, 0.1, 0.5};
+  with.linearise(x, weights, gradient, &hessian);
+  without.linearise(x, weights, same, &model);
+  CHECK((gradient.array() == same.array()).all());
+  CHECK((hessian.values.array() == model.values.array()).all());
+}
+
+TEST_CASE("the gradient of a solid's energy matches differences") {
+  const tests::Solid solid = tests::solid_torus(600);
+  const Points x = shaken(solid, 1e-2);
+  const EnergyWeights weights{1.0, 2.0, 0.2, 0.5};
+  for (const int fixed_every : {0, 1, 3}) {
+    const SolidEnergy energy = energy_of(solid, motion_of(solid, fixed_every), boundary_of(solid));
+    Points gradient;
+    linalg::BlockMatrix hessian = energy.pattern();
+    energy.linearise(x, weights, gradient, &hessian);
+    REQUIRE(hessian.values.allFinite());
+    Points step = tests::random_points(energy.rows(), 5);
+    step.array() *= (gradient.array() != 0.0).cast<double>();  // no normals of gliding vertices
+    const double slope = tests::slope(
+        [&](double t) { return energy.value(energy.move(x, step, t), weights).energy; }, 1e-6);
+    CHECK(slope == doctest::Approx((gradient.array() * step.array()).sum()).epsilon(1e-6));
+  }
+}
+
+TEST_SUITE_END();
