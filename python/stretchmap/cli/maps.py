@@ -208,7 +208,7 @@ def volume(
     solid = common.require_solid(common.read_mesh(input, orient, compact), input, "volume")
     if start is not None:
         route["start"] = resumed(solid, load_map(start), start)
-        solid = route["start"].solid
+        solid = route["start"].mesh
     watch.lap("read")
     with terminal(quiet) as bar:
         result = volume_map(
@@ -247,9 +247,9 @@ def fill(
     compact: Compact = False,
     quiet: Quiet = False,
 ) -> int:
-    """Extend a map of a solid's boundary to the inside.
+    """Map a solid whose boundary is prescribed.
 
-    One to one, of a solid of any genus.
+    One to one, of any genus.
     """
     from ..base.progress import terminal
     from ..volume.fill import fill as fill_solid

@@ -56,6 +56,14 @@ class FillMap(MapResult):
     seconds : dict
         Wall-clock time per stage.
     torus : None
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> ball = sm.samples.ball(2)
+    >>> result = sm.fill(ball, ball.surface.V + 0.1 * ball.surface.V[:, [1, 2, 0]] ** 2)
+    >>> result.solid is result.mesh, result.distortion.flips
+    (True, 0)
     """
 
     _title: ClassVar[str] = "fill"

@@ -195,7 +195,7 @@ def test_orientation_is_repaired_on_request(folder, capsys):
         (["volume", "solid.npz"], "--output"),
         (["volume", "solid.npz", "-o", "x.npz", "--ratio", "0.5"], "above 1"),
         (["volume", "solid.npz", "-o", "x.npz", "--ratio", "wide"], "'wide'"),
-        (["volume", "solid.npz", "-o", "x.npz", "--c", "-1"], "not negative"),
+        (["volume", "solid.npz", "-o", "x.npz", "--c", "-1"], "c must be at least 0"),
         (["volume", "solid.npz", "-o", "x.npz", "--c", "much"], "'--c'"),
         (["volume", "solid.npz", "-o", "x.npz", "--method", "magic"], "magic"),
         (["volume", "solid.npz", "-o", "x.npz", "--c", "1", "--boundary", "glide"], "boundary"),

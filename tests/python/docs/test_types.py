@@ -19,7 +19,10 @@ SCRIPT = Path(__file__).with_name("user_script.py")
 MISTAKES = {
     'sm.read_solid("part.msh", compact=True)': 'sm.read_solid("part.msh", compct=True)',
     "surface = solid.surface": "surface = solid.boundary",
-    'ratio="search", threads': 'ratio="serach", threads',
+    'ratio="search", glide_iter': 'ratio="serach", glide_iter',
+    "glide_iter=20": "glide_iters=20",
+    'boundary="glide"': 'boundary="gliding"',
+    "sm.FillOptions(refine=False)": "sm.FillOptions(vertex_exact=False)",
     "result.distortion.ring_std": "result.distortion.ring_sd",
     "(result.torus.R, result.torus.r)": "(result.torus.R, result.radius)",
     "result.certificate.certified": "result.certificate.ok",

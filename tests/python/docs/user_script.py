@@ -11,7 +11,9 @@ def show(stage: str, done: int, total: int, **values: float) -> None:
 
 solid = sm.read_solid("part.msh", compact=True)
 surface = solid.surface
-result = sm.volume_map(solid, ratio="search", threads=2, progress=show)
+options = sm.VolumeOptions(ratio="search", glide_iter=20)
+result = sm.volume_map(solid, boundary="glide", options=options, threads=2, progress=show)
+filled = sm.fill(solid, 2.0 * surface.V, options=sm.FillOptions(refine=False)).mesh.n_tets
 spread: float = result.distortion.ring_std
 radii = (result.torus.R, result.torus.r)
 proven: bool = result.certificate.certified
