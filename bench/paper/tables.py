@@ -165,7 +165,7 @@ def grids(meshes: Meshes) -> Rows:
         "grid to surface", "surface to grid", "farthest point moved", "s",
     )  # fmt: skip
     for name, solid in meshes.items():
-        result = sm.volume_map(solid, options=sm.FlipFreeOptions(volume_weight=1.0))
+        result = sm.volume_map(solid, options=sm.VolumeOptions(volume_weight=1.0))
         start = time.perf_counter()
         grid = hex_mesh(result)
         seconds = time.perf_counter() - start

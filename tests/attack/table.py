@@ -133,7 +133,6 @@ PARAMETERS: dict[str, Parameter] = {
     "conformal": ("object?", _value(None)),
     "torus": ("object?", _value(None)),
     "image_on.torus": ("object", lambda s: s.area_map.torus),
-    "boundary_map": ("object?", _value(None)),
     "options": ("object?", _value(None)),
     "found": ("object", lambda s: s.comparison),
     "figure": ("object", lambda s: s.figure),
@@ -148,7 +147,8 @@ PARAMETERS: dict[str, Parameter] = {
     "image": ("array", lambda s: s.solid.V),
     "images": ("arrays", lambda s: {"one": s.solid.V}),
     "angles": ("array?", _value(None)),
-    "start": ("array?", _value(None)),
+    "volume_map.start": ("object?", _value(None)),
+    "boundary_image": ("array", lambda s: s.solid.surface.V),
     "values": ("array", lambda s: s.registration.mesh.V[:, 0]),
     "interpolate.values": ("array", lambda s: s.map.mesh.V[:, 0]),
     "interpolate.T": ("array", lambda s: s.map.mesh.T),
@@ -191,7 +191,7 @@ PARAMETERS: dict[str, Parameter] = {
     "phase": ("real?", _value(0.0)),
     "c": ("real?", _value(None)),
     "tol": ("positive", _value(0.5)),
-    "volume_map.tol": ("real?", _value(None)),
+    "VolumeOptions.tol": ("real?", _value(None)),
     "register.tol": ("real", _value(0.5)),
     "tolerance": ("real", _value(1e-9)),
     "shape_budget": ("positive", _value(1.2)),
@@ -257,9 +257,9 @@ PARAMETERS: dict[str, Parameter] = {
 }
 # Knobs of the optimization, each with its own default as the sound value.
 _WHOLE_KNOBS = {"untangle_iter", "frozen_iter", "glide_iter", "target_iter", "shift_iter", "shared"}
-_WHOLE_KNOBS |= {"max_cg"}
+_WHOLE_KNOBS |= {"max_cg", "patience"}
 # Classes that are made by hand; others are results.
-CLASSES = {"FlipFreeOptions", "PointMap", "TetMesh", "Torus", "TriMesh"}
+CLASSES = {"FillOptions", "PointMap", "TetMesh", "Torus", "TriMesh", "VolumeOptions"}
 METHODS: dict[str, tuple[Callable[[Sound], Any], tuple[str, ...]]] = {
     "Torus": (
         _value(sm.Torus(3.0, 1.0)),
@@ -319,7 +319,7 @@ def _parameter(name: str, full_name: str, parameter: inspect.Parameter) -> Param
     for key in (f"{full_name}.{parameter.name}", f"{name}.{parameter.name}", parameter.name):
         if key in PARAMETERS:
             return PARAMETERS[key]
-    if name == "FlipFreeOptions":
+    if name in ("FillOptions", "VolumeOptions"):
         kind = "whole" if parameter.name in _WHOLE_KNOBS else "positive"
         return kind, _value(parameter.default)
     raise LookupError(f"no sound value for {full_name}({parameter.name}=): add it to {__file__}")

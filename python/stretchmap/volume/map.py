@@ -288,7 +288,10 @@ def _boundary_map(
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
     mesh = solid if isinstance(start.mesh, TetMesh) else solid.surface
     require_same_mesh(
-        mesh, start.mesh, "start is a map of another mesh", "pass a map of the solid or its surface"
+        mesh,
+        start.mesh,
+        "start is of another surface or solid",
+        "pass a map of the solid or its surface",
     )
     if start.torus is None:
         raise KindError("start must be a map to a torus")

@@ -275,7 +275,7 @@ def test_a_basis_or_map_of_another_surface_is_refused(bumpy: TriMesh) -> None:
             call()
     solid = stretchmap.samples.solid_torus(600)
     with pytest.raises(stretchmap.errors.KindError, match="of another surface"):
-        stretchmap.volume_map(solid, boundary_map=area_map(bumpy, finish="none"))
+        stretchmap.volume_map(solid, start=area_map(bumpy, finish="none"))
 
 
 def test_folds_are_refused_or_kept_on_request(bumpy: TriMesh) -> None:

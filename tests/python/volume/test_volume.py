@@ -319,7 +319,7 @@ def test_bad_options_are_named(bumpy, options):
 
 def test_a_start_of_another_mesh_is_refused(bumpy):
     other = sm.area_map(samples.torus_surface(12, 8))
-    with pytest.raises(KindError, match="another mesh"):
+    with pytest.raises(KindError, match="of another surface"):
         sm.volume_map(bumpy, start=other)
 
 
