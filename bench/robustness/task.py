@@ -71,7 +71,7 @@ def map_volume(mesh: sm.TetMesh, job: dict[str, Any]) -> tuple[Any, dict[str, An
 def map_area(mesh: sm.TetMesh | sm.TriMesh, job: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
     """The default area map of a surface, or of the boundary of a solid."""
     surface = mesh.surface if isinstance(mesh, sm.TetMesh) else mesh
-    result = sm.area_map(surface)
+    result = sm.area_map(surface, keep_best=True)
     proof = sm.certify(surface, result.image, result.torus)
     return result, figures.of_ratios(result.distortion.ratios) | {
         "certified": proof.certified,
