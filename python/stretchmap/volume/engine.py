@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..base.progress import Progress
+from ..certificate.checks import certify
 from ..certificate.findings import Certificate
 from ..errors import CertificationError
 from ..mesh.refinement import crowded_edges
@@ -97,7 +98,8 @@ def solve(
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")
     converged, reason, newton = _minimize(run, glide=glide)
     exact = False
-    if problem.torus is not None and isinstance(options, VolumeOptions):
+    graph = not len(stuck_tets(run.history.model, run.x, glide=glide))
+    if problem.torus is not None and isinstance(options, VolumeOptions) and graph:
         with run.timed("equalize"):
             x = equalize(run.history.model, run.x, run.history, options, glide=glide, newton=newton)
             _keep(run, x, glide, "volumes along u, v and s left as they were")
@@ -117,8 +119,9 @@ def _outcome(run: _Run, converged: bool, reason: str, exact: bool = False) -> Ou
 
 
 def _keep(run: _Run, x: NDArray[np.float64], glide: bool, otherwise: str) -> bool:
-    """Take over ``x``, unless it has an inverted tet or a folded face."""
-    if len(stuck_tets(run.history.model, x, glide=glide)):
+    """Take over ``x``, unless it has an inverted tet or a face folded beyond proof."""
+    stuck = stuck_tets(run.history.model, x, glide=glide)
+    if len(stuck) and not certify(run.problem.solid, x, run.problem.torus).certified:
         _log.warning("%s: a tet or a boundary face would turn over", otherwise)
         return False
     run.x = x

@@ -279,10 +279,19 @@ def _boundary_map(
     tol = 0.05
     if method == "vsem":
         finish, tol, ratio = "ring", 5e-3, "conformal"
-    return area_map(
-        solid.surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish, tol=tol,
-        keep_best=True, progress=progress,
-    )  # fmt: skip
+
+    def mapped(finish: Finish) -> AreaMap:
+        return area_map(
+            solid.surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish,
+            tol=tol, keep_best=True, progress=progress,
+        )  # fmt: skip
+
+    first = mapped(finish)
+    if finish != "none" or first.certificate.certified:
+        return first
+    # Folded faces are a bad start: finishing unfolds them, if anything does.
+    finished = mapped("face")
+    return finished if finished.certificate.certified else first
 
 
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
