@@ -29,7 +29,7 @@ def register(app: typer.Typer) -> None:
 
 
 def doctor(json: Json = None, quiet: Quiet = False) -> None:
-    """Print versions, threads and optional packages, and map a small solid as a test."""
+    """Print versions and packages, and test a map."""
     from ..base.tables import plain, table, versions
 
     if json is not None:

@@ -205,7 +205,7 @@ def test_orientation_is_repaired_on_request(folder, capsys):
         (["plot", "solid.npz", "-o", "x.png"], "image"),
         (["plot", "solid.npz", "-o", "x.gif"], "cannot write .gif"),
         (["report", "solid.npz", "-o", "x.txt"], "cannot write .txt"),
-        (["certify", "surface.ply"], "not a readable .npz"),
+        (["certify", "surface.ply"], "no .npz archive"),
         (["certify", "solid.npz"], "image"),
         (["nothing"], "nothing"),
         (["info", "--bogus"], "--bogus"),
@@ -354,7 +354,7 @@ def test_help_names_every_command_and_version(capsys):
     assert "..." not in out.split("Commands:")[1]
     for command in ("info", "homology", "tet", "conformal", "area", "volume", "certify", "plot",
                     "report", "demo", "coordinates", "register", "partition", "resample",
-                    "morph"):  # fmt: skip
+                    "morph", "prepare", "fill", "doctor"):  # fmt: skip
         assert f"\n  {command} " in out
         assert main([command, "--help"]) == 0
     capsys.readouterr()
