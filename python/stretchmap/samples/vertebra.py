@@ -23,6 +23,8 @@ from .sweep import (
 
 __all__ = ["VertebraPair", "vertebra_like", "vertebra_pair"]
 
+SLENDERNESS = 22.0  # length round the canal over the mean radius of the section
+
 
 def vertebra_like(n_tets: int = 40_000, seed: int | None = None) -> TetMesh:
     """A solid with the parts of a vertebra: body, pedicles, arch, and seven processes.
@@ -55,7 +57,7 @@ def vertebra_like(n_tets: int = 40_000, seed: int | None = None) -> TetMesh:
     """
     if seed is not None:
         seed = whole("seed", seed, 0)
-    return swept(n_tets, 22.0, _vertebra(seed))
+    return swept(n_tets, SLENDERNESS, individual(seed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +126,8 @@ def vertebra_pair(
     stations, sixths = 12, 6
     n_landmarks = whole("n_landmarks", n_landmarks, 0, stations * sixths)
     seed, n_tets = whole("seed", seed, 0, 2**30), pair("n_tets", n_tets, 300)
-    individuals = [_vertebra(2 * seed), _vertebra(2 * seed + 1)]
-    sizes = [resolution(count, 22.0, stations) for count in n_tets]
+    individuals = [individual(2 * seed), individual(2 * seed + 1)]
+    sizes = [resolution(count, SLENDERNESS, stations) for count in n_tets]
     source, target = (sweep(n, m, embed) for (n, m), embed in zip(sizes, individuals, strict=True))
     (n, m), _ = sizes
     truth = individuals[1](*parameters(n, m)).reshape(-1, 3)
@@ -143,7 +145,7 @@ def _bump(angle: Array, center: float, width: float) -> Array:
     return np.exp((np.cos(angle - center) - 1.0) / width**2)
 
 
-def _vertebra(seed: int | None) -> Embedding:
+def individual(seed: int | None) -> Embedding:
     """Parameter domain -> vertebra; the proportions vary by some percent with the seed."""
     rng = None if seed is None else np.random.default_rng([seed, 0x5EED])
 

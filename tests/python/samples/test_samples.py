@@ -93,6 +93,44 @@ def test_vertebra_pair():
     assert carried.volume == pytest.approx(pair.target.volume, rel=0.02)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_vertebra_population(seed):
+    bones = samples.vertebra_population(5, seed, n_tets=3000, n_landmarks=12)
+    sizes = [np.linalg.norm(np.ptp(solid.V, axis=0)) for solid in bones.solids]
+    for i, solid in enumerate(bones.solids):
+        assert solid.tet_volumes.min() > 0
+        solid.require_solid_torus()
+        np.testing.assert_allclose(bones.place(i, bones.material[i]), solid.V, atol=1e-12)
+        np.testing.assert_allclose(bones.place(i, bones.reference.V), bones.truth[i], atol=1e-12)
+        # Landmarks lie on the smooth surface, off the polyhedron by the height of a chord.
+        gap = np.linalg.norm(bones.landmarks[i][:, None] - solid.surface.V, axis=2).min(axis=1)
+        assert gap.max() < 0.08 * sizes[i]
+    assert len({solid.n_vertices for solid in bones.solids}) > 1
+    # What is left of an individual without its pose is the reference moved along the modes.
+    turn, shift = bones.poses[2, :3], bones.poses[2, 3]
+    unposed = (bones.truth[2] - shift) @ np.linalg.inv(turn)
+    moved = bones.reference.V + np.tensordot(bones.scores[2], bones.modes, 1)
+    np.testing.assert_allclose(unposed, moved, atol=1e-12)
+    again = samples.vertebra_population(5, seed, n_tets=3000, n_landmarks=12)
+    np.testing.assert_array_equal(again.solids[4].V, bones.solids[4].V)
+
+
+def test_modes_of_a_vertebra_population_are_orthogonal_to_each_other_and_to_similarities():
+    bones = samples.vertebra_population(1, n_tets=150_000)
+    x, o = bones.reference.V - bones.reference.V.mean(axis=0), np.zeros((3, 3, 3))
+    o[[0, 1, 2], [1, 2, 0], [2, 0, 1]], o[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0, -1.0
+    moved = [np.tile(e, (len(x), 1)) for e in np.eye(3)] + [x] + [x @ turn for turn in o]
+    fields = np.concatenate([bones.modes, np.stack(moved)]).reshape(4 + 7, -1)
+    fields /= np.linalg.norm(fields, axis=1, keepdims=True)
+    angles = fields[:4] @ fields.T - np.eye(4, 11)
+    assert np.abs(angles).max() < 0.05  # the points of the reference are spread a little otherwise
+
+
+def test_a_population_too_wide_is_refused():
+    with pytest.raises(SolverError, match="smaller spread"):
+        samples.vertebra_population(4, spread=30.0, n_tets=1000)
+
+
 @pytest.mark.parametrize(
     ("surface", "chi", "volume"),
     [(samples.sphere(8), 2, 4 / 3 * np.pi), (samples.double_torus(2), -2, 13.0)],
@@ -150,6 +188,8 @@ def test_tetrahedralize_names_the_package_that_is_missing(monkeypatch):
         lambda: samples.knot_tube(1000, p=2, q=4),
         lambda: samples.vertebra_pair(100),
         lambda: samples.ball(0),
+        lambda: samples.vertebra_population(0),
+        lambda: samples.vertebra_population(2, n_landmarks=73),
         lambda: samples.solid_double_torus(0),
         lambda: samples.tetrahedralize(samples.torus_surface(10, 5), quality=0.5),
     ],
