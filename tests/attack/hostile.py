@@ -142,6 +142,7 @@ HOSTILE: dict[str, dict[str, Callable[[], Any]]] = {
     "seed": _ANY | _SCALAR | _NONE | {"a half": lambda: 0.5, "minus one": lambda: -1},
     "real": _ANY | _SCALAR | _NONE,
     "positive": _ANY | _SCALAR | _NONE | {"zero": lambda: 0.0, "minus one": lambda: -1.0},
+    "share": _ANY | _SCALAR | _NONE | {"minus one": lambda: -1.0},
     "flag": _ANY | _SCALAR | _NONE | {"one": lambda: 1},
     "word": _ANY | _SCALAR | _NONE | {"zero": lambda: 0},
     "array": _ANY | _NO_ARRAY | _NONE,

@@ -141,7 +141,7 @@ PARAMETERS: dict[str, Parameter] = {
     "from_trimesh.data": ("object", lambda s: s.surface.to_trimesh()),
     "faces": ("whole", _value(500)),
     "genus": ("whole", _value(1)),
-    "max_cut": ("positive", _value(0.25)),
+    "max_cut": ("share", _value(0.25)),
     "spacing": ("array", _value((1.0, 1.0, 1.0))),
     # arrays
     "image": ("array", lambda s: s.solid.V),
@@ -212,6 +212,10 @@ PARAMETERS: dict[str, Parameter] = {
     "block": ("whole?", _value(1)),
     "rings": ("whole?", _value(1)),
     "n_hexahedra": ("whole?", _value(None)),
+    "hex_mesh.n_hexahedra": ("whole?", _value(300)),
+    "hex_mesh.sections": ("whole?", _value(None)),
+    "hex_mesh.block": ("whole?", _value(None)),
+    "hex_mesh.rings": ("whole?", _value(None)),
     "target_size": ("positive?", _value(None)),
     "optimize": ("flag", _value(False)),
     "frames": ("whole", _value(2)),
@@ -256,8 +260,9 @@ PARAMETERS: dict[str, Parameter] = {
     "progress": ("progress?", _value(None)),
 }
 # Knobs of the optimization, each with its own default as the sound value.
-_WHOLE_KNOBS = {"untangle_iter", "frozen_iter", "glide_iter", "target_iter", "shift_iter", "shared"}
-_WHOLE_KNOBS |= {"max_cg", "patience"}
+_MOST_STEPS = {"untangle_iter", "frozen_iter", "glide_iter", "target_iter", "shift_iter", "shared"}
+_MOST_STEPS |= {"max_cg", "patience"}
+_SHARES = {"floor", "frozen_tol", "glide_tol", "marginal_tol"}  # 0: as far as it goes
 # Classes that are made by hand; others are results.
 CLASSES = {"FillOptions", "PointMap", "TetMesh", "Torus", "TriMesh", "VolumeOptions"}
 METHODS: dict[str, tuple[Callable[[Sound], Any], tuple[str, ...]]] = {
@@ -320,6 +325,8 @@ def _parameter(name: str, full_name: str, parameter: inspect.Parameter) -> Param
         if key in PARAMETERS:
             return PARAMETERS[key]
     if name in ("FillOptions", "VolumeOptions"):
-        kind = "whole" if parameter.name in _WHOLE_KNOBS else "positive"
+        kind = "positive"
+        if parameter.name in _MOST_STEPS or parameter.name in _SHARES:
+            kind = "steps" if parameter.name in _MOST_STEPS else "share"
         return kind, _value(parameter.default)
     raise LookupError(f"no sound value for {full_name}({parameter.name}=): add it to {__file__}")

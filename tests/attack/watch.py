@@ -117,11 +117,11 @@ class _Lines:
         return line.decode()
 
 
-def serve(work: Callable[[Any], tuple[str, str]]) -> None:
+def serve(work: Callable[[Any], tuple[str, str]], memory: int = MEMORY) -> None:
     """Answer jobs from standard input until it ends, standard output kept clean."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     print("ready", file=answers, flush=True)
     for line in sys.stdin:
         print(json.dumps(work(json.loads(line))), file=answers, flush=True)

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import ArrayError, IndexRangeError, NonFiniteError
 
 INT32_MAX = np.iinfo(np.int32).max
+# Of coordinates: the square of a volume is still a number.
+LARGEST = 1e45
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -35,7 +37,7 @@ def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
     Raises
     ------
     ArrayError
-        Not a real (n, 3) array with at least one row.
+        Not a real (n, 3) array with at least one row, or coordinates beyond `LARGEST`.
     NonFiniteError
         A NaN or an infinity; ``ids`` are the rows.
     """
@@ -51,6 +53,13 @@ def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
         raise NonFiniteError(
             f"{name} has NaN or infinite coordinates at {describe('vertex', bad)}; "
             "replace or remove those vertices",
+            bad,
+        )
+    if np.abs(copy).max() > LARGEST:
+        bad = np.flatnonzero((np.abs(copy) > LARGEST).any(axis=1))
+        raise ArrayError(
+            f"{name} has coordinates beyond {LARGEST:g} at {describe('vertex', bad)}, whose "
+            "volumes are no numbers any more; scale the points",
             bad,
         )
     return read_only(copy)

@@ -11,6 +11,8 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
+import mmap
+import re
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,6 +28,9 @@ _log = logging.getLogger("stretchmap")
 
 # Cells below the surface (points and curves that mesh generators add) carry nothing we need.
 _IGNORED = {"vertex", "line", "line3"}
+
+# Number of cells in the text of a file.
+_ANNOUNCED = {"vtu": rb"NumberOfCells=[\"'](\d{1,18})[\"']"}
 
 
 def read_meshio(path: Path, file_format: str) -> MeshArrays:
@@ -58,6 +63,7 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     for block in mesh.cells:
         other[block.type] += len(block.data)
     found = [f"{count} {kind}" for kind, count in other.items() if count]
+    _require_all(path, file_format, sum(other.values()))
     odd = set(other) - {"triangle", "tetra"} - _IGNORED
     if any(other[kind] for kind in odd):
         raise FileFormatError(
@@ -66,6 +72,10 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
         )
     if tets is None and faces is None:
         raise FileFormatError(f"no triangles and no tets ({', '.join(found) or 'no cells'})")
+    used = ("triangle",) if tets is None else ("tetra",)
+    left_out = [f"{count} {kind}" for kind, count in other.items() if count and kind not in used]
+    if left_out:
+        _log.info("%s: cells left out: %s", path, ", ".join(left_out))
     blocks = face_blocks if tets is None else tet_blocks
     return MeshArrays(
         mesh.points,
@@ -92,6 +102,17 @@ def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
             cell_data={k: [_plain(a)] for k, a in mesh.cell_data.items()},
         )
         meshio._helpers._writer_map[file_format](str(path), out, **options)
+
+
+def _require_all(path: Path, file_format: str, found: int) -> None:
+    """Raise where cells are missing: meshio passes over those of a type it does not know."""
+    pattern = _ANNOUNCED.get(file_format)
+    if pattern is None:
+        return
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        announced = sum(int(count) for count in re.findall(pattern, data))
+    if announced != found:
+        raise FileFormatError(f"{announced} cells are announced, {found} can be understood")
 
 
 def _plain(array: NDArray[Any]) -> NDArray[Any]:

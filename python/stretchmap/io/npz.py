@@ -14,7 +14,7 @@ from ..base.options import installed_memory
 from ..errors import ArrayError, FileFormatError
 from .arrays import MeshArrays
 
-__all__ = ["read_archive", "read_npz", "save_npz", "write_npz"]
+__all__ = ["read_archive", "read_array", "read_npz", "save_npz", "write_npz"]
 
 _MESH_KEYS = ("V", "F", "T")
 _SLICE = 1 << 20  # bytes
@@ -69,11 +69,34 @@ def read_archive(file: BinaryIO) -> dict[str, NDArray[Any]]:
     file.seek(0)
     with zipfile.ZipFile(file) as archive:
         size = sum(member.file_size for member in archive.infolist())
-    if size > installed_memory():
-        raise FileFormatError(f"its arrays take {size / 2**30:.3g} GiB, more than there is memory")
-    file.seek(0)
-    with np.load(file, allow_pickle=False) as loaded:
-        return {name: np.asarray(loaded[name]) for name in loaded.files}
+        if size > installed_memory():
+            raise FileFormatError(
+                f"its arrays take {size / 2**30:.3g} GiB, more than there is memory"
+            )
+        names = [name for name in archive.namelist() if name.endswith(".npy")]
+        if len(set(names)) < len(names):
+            raise FileFormatError("it holds two arrays of one name")
+        arrays = {}
+        for name in names:
+            with archive.open(name) as member:
+                arrays[name.removesuffix(".npy")] = read_array(member)
+        return arrays
+
+
+def read_array(file: IO[bytes]) -> NDArray[Any]:
+    """The one array of a ``.npy`` file.
+
+    Raises
+    ------
+    FileFormatError
+        Something follows it: its header says less than there is.
+    Exception
+        As `read_archive`.
+    """
+    array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+    if file.read(1):
+        raise FileFormatError(f"more follows an array said to have shape {array.shape}")
+    return array
 
 
 def read_npz(file: BinaryIO) -> MeshArrays:

@@ -6,10 +6,13 @@ import re
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import FileFormatError
 from .arrays import MeshArrays
 
+# Of a facet: nothing for the line that opens it, the rest of the line for each corner.
+_LINE = re.compile(rb"^[ \t]*(?:facet\b|vertex[ \t]+(\S.*)$)", re.MULTILINE | re.IGNORECASE)
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -21,8 +24,7 @@ def read_stl(data: bytes) -> MeshArrays:
     elif data.lstrip()[:5].lower() == b"solid":
         if b"endsolid" not in data:
             raise FileFormatError("endsolid is missing, the file is cut off")
-        lines = re.findall(rb"^[ \t]*vertex[ \t]+(.*)$", data, re.MULTILINE)
-        corners = np.array([line.split() for line in lines]).astype(np.float64)
+        corners = _text_corners(data)
     else:
         raise FileFormatError(
             f"{len(data)} bytes, but the header announces {max(count, 0)} triangles"
@@ -31,6 +33,15 @@ def read_stl(data: bytes) -> MeshArrays:
         raise FileFormatError(f"{len(corners)} triangle corners")
     points, faces = np.unique(corners + 0.0, axis=0, return_inverse=True)
     return MeshArrays(points, F=faces.reshape(-1, 3))
+
+
+def _text_corners(data: bytes) -> NDArray[np.float64]:
+    """Corners of all facets of a text file, which must have three each."""
+    lines = _LINE.findall(data)
+    opens = np.array([not corner for corner in lines], bool)
+    if len(opens) % 4 or (np.flatnonzero(opens) != np.arange(0, len(opens), 4)).any():
+        raise FileFormatError(f"{int(opens.sum())} facets, not all with three corners")
+    return np.array([corner.split() for corner in lines if corner]).astype(np.float64)
 
 
 def write_stl(file: BinaryIO, mesh: MeshArrays) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import options
+from ..base.arrays import as_reals
 from ..base.progress import Progress, report
-from ..errors import GenusError, SelfIntersectionError, SolverError
+from ..errors import GenusError, OptionError, SelfIntersectionError, SolverError
 from ..mesh.given import as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.tetrahedralize import tetrahedralize
@@ -29,6 +30,7 @@ _WORKING_FACES = 50_000  # handles are looked for on no more than about that man
 _WORKING_ITERATIONS = 3
 _TET = 2.0  # largest tet, in regular tets over the boundary's mean edge
 _REMESHINGS = 3
+_BYTES_PER_FACE = 5e3  # of the boundary, tets included; measured
 
 
 def prepare(
@@ -95,11 +97,19 @@ def prepare(
     faces = options.whole("faces", faces, 100)
     genus = options.whole("genus", genus, 0)
     max_cut = options.real("max_cut", max_cut, 0.0)
+    options.memory(f"a surface of {faces} faces and its tets", _BYTES_PER_FACE * faces)
+    options.callback("progress", progress)
+    steps = as_reals(spacing, "spacing", (3,))
+    if (steps <= 0.0).any():
+        raise OptionError(f"spacing must be three positive numbers, got {steps.tolist()}")
     run = _Run(progress)
     if isinstance(surface, np.ndarray):
-        V, F = run.arrays("mask", mask_surface, surface, spacing)
+        V, F = run.arrays("mask", mask_surface, surface, steps)
     else:
-        V, F = as_surface(surface).V, as_surface(surface).F
+        raw = as_surface(surface)
+        if (steps != 1.0).any():
+            raise OptionError("spacing is that of the voxels of a mask, a surface has none")
+        V, F = raw.V, raw.F
     V, F = run.arrays("weld", weld, V, F, _WELD * float(np.ptp(V, axis=0).max()))
     V, F = run.arrays("orient", part_sheets, V, F)
     V, F = run.arrays("debris", keep_largest, V, F)

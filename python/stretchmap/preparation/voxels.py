@@ -13,7 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ..errors import ArrayError, FileFormatError, MissingDependencyError, OptionError
+from ..base.files import open_to_read, parsing
+from ..base.options import as_path
+from ..errors import ArrayError, FileFormatError, MissingDependencyError
+from ..io.npz import read_archive, read_array
 
 __all__ = ["holds_mask", "mask_surface", "read_mask"]
 
@@ -42,19 +45,15 @@ def mask_surface(
     ------
     ArrayError
         Not such a mask, or an empty one.
-    OptionError
-        ``spacing`` is not three positive numbers.
     MissingDependencyError
         If scikit-image is not installed.
     """
-    mask, steps = np.asarray(mask), np.asarray(spacing, dtype=float)
+    mask = np.asarray(mask)
     if mask.ndim != 3 or mask.dtype.kind not in "biu":
         raise ArrayError(
             f"a mask is a 3-dimensional array of bool or integers, not {mask.dtype} of shape "
             f"{mask.shape}; make one by a threshold, volume > level"
         )
-    if steps.shape != (3,) or not (np.isfinite(steps).all() and (steps > 0.0).all()):
-        raise OptionError(f"spacing must be three positive numbers, got {spacing!r}")
     if not mask.any():
         raise ArrayError("the mask is empty")
     if importlib.util.find_spec("skimage") is None:
@@ -74,8 +73,8 @@ def mask_surface(
         "cavity_voxels_filled": int(filled.sum() - sizes.max()),
         "faces": len(F),
     }
-    corner = np.array([axis.start for axis in box]) - 3
-    return (V.astype(float) + corner) * steps, np.ascontiguousarray(F, np.int32), counts
+    V = (V + np.array([axis.start for axis in box]) - 3) * np.asarray(spacing, float)
+    return V, np.ascontiguousarray(F, np.int32), counts
 
 
 def holds_mask(path: str | os.PathLike[str]) -> bool:
@@ -121,21 +120,13 @@ def read_mask(
     OSError
         If it cannot be opened.
     """
-    with open(path, "rb"):
-        pass  # what the operating system has to say comes first
-    try:
-        if Path(path).suffix.lower() in (".nii", ".gz"):
+    path = as_path(path)
+    with open_to_read(path) as file, parsing(path):
+        if path.suffix.lower() in (".nii", ".gz"):
             return _read_nifti(path)
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return loaded, None
-        with loaded as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except MissingDependencyError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise FileFormatError(f"{path} is damaged or no voxel mask: {reason}") from error
+        if path.suffix.lower() == ".npy":
+            return read_array(file), None
+        arrays = read_archive(file)
     masks = [name for name, array in arrays.items() if array.ndim == 3]
     if len(masks) != 1:
         raise FileFormatError(f"{path} must hold one 3-dimensional array, it holds {len(masks)}")

@@ -218,7 +218,7 @@ def register(
         )
     return _fill(
         boundary, source.n_vertices, target, marks, gauge, landmark_map, history,
-        options or FillOptions(), keep_best, seconds, progress,
+        FillOptions() if options is None else options, keep_best, seconds, progress,
     )  # fmt: skip
 
 

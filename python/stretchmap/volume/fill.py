@@ -170,7 +170,8 @@ def fill(
             f"boundary_image must have shape {solid.surface.V.shape}, one row per boundary vertex, "
             f"got {points.shape}"
         )
-    options = instance("options", options or FillOptions(), FillOptions, "FillOptions(...)")
+    options = FillOptions() if options is None else options
+    instance("options", options, FillOptions, "FillOptions(...)")
     result = filled(solid, points, options, progress)
     if not keep_best:
         require_certified(result.certificate, "the map")
