@@ -24,8 +24,7 @@ System harmonic_system(const SolidTorus& solid) {
     fixed[i] = 1;
     x.row(i) = solid.standard.row(i);
   }
-  volume::TetLaplacian laplacian(solid.tets, fixed,
-                                 volume::signed_tet_volumes(solid.points, solid.tets));
+  volume::TetLaplacian laplacian(solid.tets, fixed, mesh::tet_volumes(solid.points, solid.tets));
   System system{laplacian.pattern(), {}};
   Points rhs;
   laplacian.assemble(solid.points, 0.0, x, system.matrix, rhs);

@@ -24,7 +24,7 @@ struct Problem {
 Problem make_problem(const SolidTorus& solid) {
   Problem p;
   const Index n = static_cast<Index>(solid.points.rows());
-  p.rest = volume::signed_tet_volumes(solid.points, solid.tets);
+  p.rest = mesh::tet_volumes(solid.points, solid.tets);
   const double scale = 1.0 / std::cbrt(p.rest.sum());
   p.rest /= p.rest.sum();
   p.V = solid.points * scale;
@@ -46,7 +46,7 @@ struct Quality {
 };
 
 Quality quality(const Points& x, const Tets& tets, const Vec& rest) {
-  const Vec volumes = volume::signed_tet_volumes(x, tets);
+  const Vec volumes = mesh::tet_volumes(x, tets);
   return {volume::tet_stretch_energy(volumes, rest), double((volumes.array() <= 0.0).count())};
 }
 

@@ -37,11 +37,11 @@ FOLDER = Path(os.environ.get("STRETCHMAP_MESHES", HERE.parents[2] / "shared" / "
 
 def ours(V: Any, T: Any, fixed: Any, start: Any, c: float, steps: int) -> tuple[Any, float]:
     """The library's kernels, as volume_map drives them."""
-    rest = _core.volume.signed_tet_volumes(V, T)
+    rest = _core.mesh.tet_volumes(V, T)
     stretch = _core.volume.VolumetricStretch(T, fixed.astype(np.uint8), rest, "auto")
 
     def energy_of(x: Any) -> float:
-        return float(_core.volume.tet_stretch_energy(_core.volume.signed_tet_volumes(x, T), rest))
+        return float(_core.volume.tet_stretch_energy(_core.mesh.tet_volumes(x, T), rest))
 
     x, _ = stretch.harmonic(V, start, HARMONIC_TOL)
     energy = energy_of(x)

@@ -121,8 +121,6 @@ void bind_area(py::module_& m) {
         release_gil());
   m.def("surface_quality", &area::surface_quality, py::arg("reference"),
         py::arg("faces").noconvert(), py::arg("image").noconvert(), release_gil());
-  m.def("torus_image", &area::torus_image, py::arg("turns").noconvert(), py::arg("phase"),
-        py::arg("ratio"), release_gil());
   m.def(
       "glide_energy",
       [](const area::GlideProblem& problem, double area, double shape, double chart, double scale,

@@ -5,6 +5,7 @@
 
 #include "stretchmap/area/line_roots.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::area {
 
@@ -72,7 +73,6 @@ Vec equal_area_from_angle(const VecRef& v, double tube_ratio) {
 }
 
 Vec angle_from_equal_area(const VecRef& s, double tube_ratio) {
-  constexpr double kTwoPi = 6.283185307179586476925287;
   Vec v(s.size());
   for (Index i = 0; i < s.size(); ++i) {
     const double whole = kTwoPi * std::round(s(i) / kTwoPi);

@@ -1,7 +1,9 @@
 // Functions of the six angles of a face's corners, to second order.
 #pragma once
 
-#include "area/torus_point.hpp"
+#include <vector>
+
+#include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::area {
 
@@ -14,6 +16,14 @@ struct Jet {
   Six gradient = Six::Zero();
   SixSix hessian = SixSix::Zero();
 };
+
+inline std::vector<TorusPoint> torus_points(const Torus& torus, const Points2Ref& angles) {
+  const Index n = static_cast<Index>(angles.rows());
+  std::vector<TorusPoint> points(static_cast<std::size_t>(n));
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < n; ++i) points[i] = torus.jet(angles(i, 0), angles(i, 1));
+  return points;
+}
 
 // Area of the triangle in space. With e_k the edge opposite to corner k and N the unit normal:
 // d/dp_k = 1/2 N x e_k, d2/dp_j dp_k = (e_j . e_k) N N' / (2 |n|) -+ 1/2 [N]x.

@@ -49,30 +49,29 @@ void add_component(const TorusPoint (&p)[3], const Vector3d& w, double factor, b
   }
 }
 
-// Where the face looks outward least inside its interval of u: (A . p - axis |A_flat|) / tube.
-Jet inner_facing(const TorusPoint (&p)[3], const Vector3d& area, double axis, double tube,
-                 bool second) {
+// Where the face looks outward least inside its interval of u: (A . p - R |A_flat|) / r.
+Jet inner_facing(const TorusPoint (&p)[3], const Vector3d& area, const Torus& torus, bool second) {
   Jet jet;
   Vector3d way(area.x(), area.y(), 0.0);
   const double flat = way.norm();
   way /= flat;
-  jet.value = (area.dot(p[0].point) - axis * flat) / tube;
-  add_component(p, way, -axis / tube, second, jet);
+  jet.value = (area.dot(p[0].point) - torus.R * flat) / torus.r;
+  add_component(p, way, -torus.R / torus.r, second, jet);
   // A . p is half the determinant of the corners.
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
-    const Vector3d by_point = 0.5 / tube * p[j].point.cross(p[k].point);
+    const Vector3d by_point = 0.5 / torus.r * p[j].point.cross(p[k].point);
     jet.gradient.segment<2>(2 * i) += p[i].tangent.transpose() * by_point;
     if (!second) continue;
     jet.hessian.block<2, 2>(2 * i, 2 * i) += p[i].curvature(by_point);
-    const Matrix2d block = -0.5 / tube * mixed(p[i].tangent, p[k].point, p[j].tangent);
+    const Matrix2d block = -0.5 / torus.r * mixed(p[i].tangent, p[k].point, p[j].tangent);
     jet.hessian.block<2, 2>(2 * i, 2 * j) += block;
     jet.hessian.block<2, 2>(2 * j, 2 * i) += block.transpose();
   }
   if (!second) return jet;
   Jet sideways;  // the change of |A_flat| by the turning of A_flat
   add_component(p, Vector3d(-way.y(), way.x(), 0.0), 1.0, false, sideways);
-  jet.hessian -= axis / (tube * flat) * sideways.gradient * sideways.gradient.transpose();
+  jet.hessian -= torus.R / (torus.r * flat) * sideways.gradient * sideways.gradient.transpose();
   return jet;
 }
 
@@ -107,12 +106,12 @@ Jet corner_facing(const TorusPoint (&p)[3], int k, bool second) {
   return jet;
 }
 
-Facing facing(const TorusPoint (&p)[3], double axis, double tube, bool second) {
+Facing facing(const TorusPoint (&p)[3], const Torus& torus, bool second) {
   Facing result{
       {corner_facing(p, 0, second), corner_facing(p, 1, second), corner_facing(p, 2, second)}, {}};
   const Vector3d area = area_vector(p);
   if (inside(p, area.head<2>()))
-    result.least = inner_facing(p, area, axis, tube, second);
+    result.least = inner_facing(p, area, torus, second);
   else
     result.least = *std::min_element(result.corner, result.corner + 3,
                                      [](const Jet& a, const Jet& b) { return a.value < b.value; });

@@ -18,6 +18,6 @@ struct Facing {
   Jet least;  // over the whole face
 };
 
-Facing facing(const TorusPoint (&p)[3], double axis, double tube, bool second);
+Facing facing(const TorusPoint (&p)[3], const Torus& torus, bool second);
 
 }  // namespace stretchmap::area

@@ -131,7 +131,6 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
                 Derivatives derivatives) {
   const bool second = needs_hessian(derivatives);
   const double curvature = derivatives == Derivatives::kModel ? kModelCurvature : 1.0;
-  constexpr double kTwoPi = 6.283185307179586476925287;
   TorusPoint p[3];
   Eigen::Vector2d angle[3];
   for (int k = 0; k < 3; ++k) {
@@ -151,8 +150,7 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
   add_barrier(area, scale * size, weights.area * size, curvature, second, sum);
   if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * size, 1.0, second, sum);
   if (weights.facing > 0.0) {
-    const double tube = tube_radius(problem.ratio);
-    const Facing outward = facing(p, problem.ratio * tube, tube, second);
+    const Facing outward = facing(p, problem.torus(), second);
     if (weights.epsilon <= 0.0 && !(outward.least.value > 0.0)) {
       sum.value = std::numeric_limits<double>::infinity();
       return sum;
@@ -174,7 +172,7 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
                          const Points2Ref& angles, Derivatives derivatives) {
   const Index m = static_cast<Index>(problem.chart.faces.rows());
   const bool second = needs_hessian(derivatives);
-  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Vec values(m);
   Rows gradients(derivatives == Derivatives::kNone ? 0 : m, 6);
   GlideEnergy energy;
@@ -200,27 +198,27 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
 }
 
 Points glide_image(const GlideProblem& problem, const Points2Ref& angles) {
-  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Points image(angles.rows(), 3);
   for (Index i = 0; i < static_cast<Index>(image.rows()); ++i) image.row(i) = points[i].point;
   return image;
 }
 
 double least_facing(const GlideProblem& problem, const Points2Ref& angles) {
-  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
-  const double tube = tube_radius(problem.ratio);
+  const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
+  const Torus torus = problem.torus();
   double least = std::numeric_limits<double>::infinity();
   for (Index f = 0; f < problem.chart.faces.rows(); ++f) {
     TorusPoint p[3];
     for (int k = 0; k < 3; ++k) p[k] = points[problem.chart.faces(f, k)];
-    const double value = facing(p, problem.ratio * tube, tube, false).least.value;
+    const double value = facing(p, torus, false).least.value;
     least = std::min(least, value / problem.reference.areas(f));
   }
   return least;
 }
 
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles) {
-  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Vec areas(problem.chart.faces.rows());
   for (Index f = 0; f < areas.size(); ++f) {
     const Eigen::Vector3d p = points[problem.chart.faces(f, 0)].point;

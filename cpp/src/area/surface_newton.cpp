@@ -5,15 +5,14 @@
 #include <limits>
 #include <vector>
 
-#include "area/torus_point.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/torus.hpp"
 #include "stretchmap/certificate/torus_graph.hpp"
 
 namespace stretchmap::area {
 
 namespace {
 
-constexpr double kTwoPi = 6.283185307179586476925287;
 constexpr double kArmijo = 1e-4;
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
 constexpr int kBestSteps = 2;        // towards it, of each kind
@@ -130,9 +129,9 @@ SurfaceFigures SurfaceNewton::figures() const {
   const Vec& source = problem_.reference.areas;
   figures.energy = (areas.array().square() / source.array()).sum();
   const Points image = glide_image(problem_, angles_);
-  const double axis = problem_.ratio * tube_radius(problem_.ratio);
+  const double R = problem_.torus().R;
   figures.flips =
-      static_cast<Index>(certificate::torus_graph(image, problem_.chart.faces, axis).bad.size());
+      static_cast<Index>(certificate::torus_graph(image, problem_.chart.faces, R).bad.size());
   figures.angle_mean = surface_quality(problem_.reference, problem_.chart.faces, image).angle_mean;
   ratio_figures(problem_.chart.faces, problem_.chart.n_vertices, source, areas, figures);
   return figures;

@@ -8,12 +8,9 @@
 
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::area {
-
-namespace {
-constexpr double kTwoPi = 6.283185307179586476925287;
-}
 
 namespace {
 
@@ -81,19 +78,6 @@ SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef
   quality.angle_mean = (reference.areas.array() * angle).sum();
   quality.angle_max = angle.maxCoeff();
   return quality;
-}
-
-Points torus_image(const Points2Ref& turns, double phase, double ratio) {
-  const double tube = 1.0 / (kTwoPi * std::sqrt(ratio));  // area 4 pi^2 ratio tube^2 = 1
-  const Vec s = kTwoPi * (turns.col(1).array() + phase);
-  const Eigen::ArrayXd v = angle_from_equal_area(s, 1.0 / ratio).array();
-  const Eigen::ArrayXd u = kTwoPi * turns.col(0).array();
-  const Eigen::ArrayXd axis = tube * (ratio + v.cos());
-  Points image(turns.rows(), 3);
-  image.col(0) = axis * u.cos();
-  image.col(1) = axis * u.sin();
-  image.col(2) = tube * v.sin();
-  return image;
 }
 
 namespace {

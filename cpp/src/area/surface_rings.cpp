@@ -26,7 +26,7 @@ struct Rings {
 Rings measure(const GlideProblem& problem, const Points2Ref& angles) {
   const Faces& faces = problem.chart.faces;
   const Index n = problem.chart.n_vertices;
-  const std::vector<TorusPoint> points = torus_points(problem.ratio, angles);
+  const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Rings rings{Vec::Zero(n), Vec::Zero(n), Rows(faces.rows(), 6), 0.0};
   for (Index f = 0; f < faces.rows(); ++f) {
     TorusPoint p[3];

@@ -6,13 +6,13 @@
 #include <limits>
 #include <vector>
 
+#include "stretchmap/base/torus.hpp"
+
 namespace stretchmap::certificate {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
 using Vec3 = Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 double cross(const Vec2& a, const Vec2& b) { return a[0] * b[1] - a[1] * b[0]; }
 
@@ -64,7 +64,7 @@ FaceOnTorus examine(const std::array<Vec3, 3>& x, double R) {
   for (int k = 0; k < 3; ++k) {
     const double facing = std::atan2(n[2], n_flat.dot(unit[k]));
     const double angle = std::atan2(x[k][2], flat[k].norm() - R);
-    v[k] = facing + std::remainder(angle - facing, 2.0 * kPi);
+    v[k] = facing + std::remainder(angle - facing, kTwoPi);
   }
   out.chart_area = 0.5 * ((u[1] - u[0]) * (v[2] - v[0]) - (v[1] - v[0]) * (u[2] - u[0]));
   return out;

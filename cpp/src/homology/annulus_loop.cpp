@@ -7,6 +7,8 @@
 #include <queue>
 #include <utility>
 
+#include "stretchmap/base/incidence.hpp"
+
 namespace stretchmap::homology {
 namespace {
 
@@ -21,8 +23,7 @@ struct CutGraph {
   };
   std::vector<Index> tail;    // (3m) node at the tail of a half-edge, on the side of its face
   std::vector<Index> vertex;  // of each node
-  std::vector<Index> start;
-  std::vector<Arc> arcs;
+  Incidence<Arc> arcs;        // of each node
 
   Index size() const { return static_cast<Index>(vertex.size()); }
   Index left(Index h) const { return tail[h]; }
@@ -45,19 +46,13 @@ CutGraph cut_open(const mesh::SurfaceTopology& top, const VecRef& edge_length,
     } while (h != first);
   }
   // An edge that is not cut is walked one way by each of its half-edges, a cut one both ways.
-  graph.start.assign(graph.size() + 1, 0);
-  for (Index h = 0; h < top.twin.size(); ++h) {
-    ++graph.start[graph.left(h) + 1];
-    if (is_cut[top.edge[h]]) ++graph.start[graph.left_head(h) + 1];
-  }
-  for (Index i = 0; i < graph.size(); ++i) graph.start[i + 1] += graph.start[i];
-  graph.arcs.resize(graph.start.back());
-  std::vector<Index> fill(graph.start.begin(), graph.start.end() - 1);
-  for (Index h = 0; h < top.twin.size(); ++h) {
-    const Index e = top.edge[h], i = graph.left(h), j = graph.left_head(h);
-    graph.arcs[fill[i]++] = {edge_length[e], j};
-    if (is_cut[e]) graph.arcs[fill[j]++] = {edge_length[e], i};
-  }
+  graph.arcs = Incidence<CutGraph::Arc>(graph.size(), [&](const auto& visit) {
+    for (Index h = 0; h < top.twin.size(); ++h) {
+      const Index e = top.edge[h], i = graph.left(h), j = graph.left_head(h);
+      visit(i, CutGraph::Arc{edge_length[e], j});
+      if (is_cut[e]) visit(j, CutGraph::Arc{edge_length[e], i});
+    }
+  });
   return graph;
 }
 
@@ -95,9 +90,7 @@ class PathSearch {
       if (total > distance_[i] + estimate(i)) continue;
       if (poll_ && ++settled_ % 4096 == 0) poll_();
       if (goal(i)) return i;
-      for (Index a = graph_.start[i]; a < graph_.start[i + 1]; ++a) {
-        reach(graph_.arcs[a].to, distance_[i] + graph_.arcs[a].length, i);
-      }
+      for (const CutGraph::Arc& arc : graph_.arcs[i]) reach(arc.to, distance_[i] + arc.length, i);
     }
     return -1;
   }

@@ -8,10 +8,7 @@ namespace stretchmap::homology {
 CoverSearch::CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                          const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
                          Poll poll, double limit)
-    : poll_(std::move(poll)),
-      n_vertices_(top.n_vertices),
-      start_(top.n_vertices + 1),
-      best_(limit) {
+    : poll_(std::move(poll)), n_vertices_(top.n_vertices), best_(limit) {
   const std::vector<Index> move = number_moves(forms);
   const Sheet there(target.data(), target.data() + target.size());
   forward_ = static_cast<Index>(moves_.size());
@@ -20,15 +17,13 @@ CoverSearch::CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_le
     moves_.push_back(there);
     for (Index& step : moves_.back()) step *= sign;
   }
-  arcs_.resize(top.twin.size());
-  for (Index h = 0; h < top.twin.size(); ++h) ++start_[top.tail(h) + 1];
-  for (Index i = 0; i < n_vertices_; ++i) start_[i + 1] += start_[i];
-  std::vector<Index> fill(start_.begin(), start_.end() - 1);
-  for (Index h = 0; h < top.twin.size(); ++h) {
-    const Index e = top.edge[h], i = top.tail(h), j = top.head(h);
-    const Index turn = move[e] == 0 || i < j ? 0 : 1;
-    arcs_[fill[i]++] = {edge_length[e], j, 2 * move[e] + turn};
-  }
+  arcs_ = Incidence<Arc>(n_vertices_, [&](const auto& visit) {
+    for (Index h = 0; h < top.twin.size(); ++h) {
+      const Index e = top.edge[h], i = top.tail(h), j = top.head(h);
+      const Index turn = move[e] == 0 || i < j ? 0 : 1;
+      visit(i, Arc{edge_length[e], j, 2 * move[e] + turn});
+    }
+  });
   origin_ = sheet_id(Sheet(target.size(), 0));
 }
 
@@ -106,8 +101,7 @@ CoverSearch::Node& CoverSearch::node(Index sheet, Index i) {
 void CoverSearch::settle(Index sheet, Index i, double distance) {
   meet(sheet, i, step(sheet, forward_), distance);
   meet(sheet, i, step(sheet, backward_), distance);
-  for (Index a = start_[i]; a < start_[i + 1]; ++a) {
-    const Arc& arc = arcs_[a];
+  for (const Arc& arc : arcs_[i]) {
     const double candidate = distance + arc.length;
     if (candidate >= limit_) continue;
     const Index there = step(sheet, arc.move);

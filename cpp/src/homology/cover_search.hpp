@@ -8,6 +8,7 @@
 #include <queue>
 #include <vector>
 
+#include "stretchmap/base/incidence.hpp"
 #include "stretchmap/homology/tree_cotree.hpp"
 
 namespace stretchmap::homology {
@@ -59,8 +60,7 @@ class CoverSearch {
 
   Poll poll_;
   Index n_vertices_;
-  std::vector<Index> start_;
-  std::vector<Arc> arcs_;     // of vertex i: start_[i] to start_[i + 1]
+  Incidence<Arc> arcs_;       // of each vertex
   std::vector<Sheet> moves_;  // 0 stays in the sheet; 2 k and 2 k + 1 are opposite
   Index forward_, backward_;  // the moves by the target and by its opposite
   std::map<Sheet, Index> ids_;

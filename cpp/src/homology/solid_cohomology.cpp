@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/incidence.hpp"
 
 namespace stretchmap::homology {
 namespace {
@@ -97,7 +98,6 @@ class Propagation {
   // Edges of each tet with its corners sorted, so that all local edges run from low to high id.
   void index_tets(const TetsRef& tets) {
     tet_edges_.resize(tets.rows());
-    around_start_.assign(edges_.rows() + 1, 0);
     for (Index t = 0; t < tets.rows(); ++t) {
       if (poll_ && t % 65536 == 0) poll_();
       std::array<Index, 4> corner{tets(t, 0), tets(t, 1), tets(t, 2), tets(t, 3)};
@@ -105,15 +105,12 @@ class Propagation {
       for (int k = 0; k < 6; ++k) {
         const Index e = find_edge(corner[kEdge[k][0]], corner[kEdge[k][1]]);
         tet_edges_[t][k] = e;
-        ++around_start_[e + 1];
       }
     }
-    for (Index e = 0; e < edges_.rows(); ++e) around_start_[e + 1] += around_start_[e];
-    around_.resize(6 * tets.rows());
-    std::vector<Index> cursor(around_start_.begin(), around_start_.end() - 1);
-    for (Index t = 0; t < tets.rows(); ++t) {
-      for (const Index e : tet_edges_[t]) around_[cursor[e]++] = t;
-    }
+    tets_at_ = Incidence<>(static_cast<Index>(edges_.rows()), [&](const auto& visit) {
+      for (Index t = 0; t < tets.rows(); ++t)
+        for (const Index e : tet_edges_[t]) visit(e, t);
+    });
   }
 
   void learn(Index e, Value value) {
@@ -126,25 +123,15 @@ class Propagation {
   // met.
   std::vector<Index> span() {
     const Index n = static_cast<Index>(first_.size()) - 1;
-    std::vector<Index> start(n + 1, 0), around(2 * edges_.rows());
-    for (Index e = 0; e < edges_.rows(); ++e) {
-      ++start[edges_(e, 0) + 1];
-      ++start[edges_(e, 1) + 1];
-    }
-    for (Index i = 0; i < n; ++i) start[i + 1] += start[i];
-    std::vector<Index> cursor(start.begin(), start.end() - 1);
-    for (Index e = 0; e < edges_.rows(); ++e) {
-      around[cursor[edges_(e, 0)]++] = e;
-      around[cursor[edges_(e, 1)]++] = e;
-    }
+    const Incidence<> ends_at = corners_at(edges_, n);
     std::vector<char> seen(n, 0), listed(edges_.rows(), 0);
     std::vector<Index> vertices{edges_(0, 0)}, order;
     order.reserve(edges_.rows());
     seen[vertices[0]] = 1;
     for (std::size_t at = 0; at < vertices.size(); ++at) {
       const Index i = vertices[at];
-      for (Index p = start[i]; p < start[i + 1]; ++p) {
-        const Index e = around[p];
+      for (const Index end : ends_at[i]) {
+        const Index e = end / 2;
         const Index j = edges_(e, 0) == i ? edges_(e, 1) : edges_(e, 0);
         if (!seen[j]) {
           seen[j] = 1;
@@ -166,7 +153,7 @@ class Propagation {
       if (poll_ && ++work_ % 65536 == 0) poll_();
       const Index e = queue_.back();
       queue_.pop_back();
-      for (Index p = around_start_[e]; p < around_start_[e + 1]; ++p) complete(around_[p]);
+      for (const Index t : tets_at_[e]) complete(t);
     }
   }
 
@@ -197,7 +184,7 @@ class Propagation {
   std::vector<char> known_;
   std::vector<Index> first_;  // edges with lower id i are first_[i] .. first_[i + 1]
   std::vector<std::array<Index, 6>> tet_edges_;
-  std::vector<Index> around_start_, around_;  // tets around each edge
+  Incidence<> tets_at_;  // of each edge
   std::vector<Index> queue_;
   Index n_unknowns_ = 0;
 };

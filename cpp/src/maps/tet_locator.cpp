@@ -56,16 +56,10 @@ TetLocator::TetLocator(const PointsRef& points, const TetsRef& tets, double tole
       range(t, a, b);
       for (int z = a[2]; z <= b[2]; ++z)
         for (int y = a[1]; y <= b[1]; ++y)
-          for (int x = a[0]; x <= b[0]; ++x)
-            visit(static_cast<std::size_t>(x + size_[0] * (y + size_[1] * z)), t);
+          for (int x = a[0]; x <= b[0]; ++x) visit(x + size_[0] * (y + size_[1] * z), t);
     }
   };
-  start_.assign(static_cast<std::size_t>(size_.prod()) + 1, 0);
-  for_cells([&](std::size_t c, Index) { ++start_[c + 1]; });
-  for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
-  tet_.resize(static_cast<std::size_t>(start_.back()));
-  std::vector<std::int64_t> next(start_.begin(), start_.end() - 1);
-  for_cells([&](std::size_t c, Index t) { tet_[static_cast<std::size_t>(next[c]++)] = t; });
+  tets_in_ = Incidence<Index, std::int64_t>(size_.prod(), for_cells);
 }
 
 Index TetLocator::cell(const Eigen::Vector3d& p) const {
@@ -113,9 +107,10 @@ TetLocation TetLocator::locate(const PointsRef& queries, const Poll& poll) const
       Best best;
       // The comparison fails for a NaN, too.
       if ((p.array() >= low_.array()).all() && (p.array() <= high_.array()).all()) {
-        const std::size_t c = static_cast<std::size_t>(cell(p));
-        for (std::int64_t e = start_[c]; e < start_[c + 1] && best.distance < 0.0; ++e)
-          examine(p, tet_[static_cast<std::size_t>(e)], best);
+        for (const Index t : tets_in_[cell(p)]) {
+          examine(p, t, best);
+          if (best.distance >= 0.0) break;
+        }
       }
       found.tet[i] = best.tet;
       if (best.tet >= 0)

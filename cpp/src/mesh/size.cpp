@@ -40,13 +40,15 @@ Vec face_areas(const PointsRef& points, const FacesRef& faces) {
 }
 
 Vec tet_volumes(const PointsRef& points, const TetsRef& tets) {
-  Vec volumes(tets.rows());
-  for (Index t = 0; t < tets.rows(); ++t) {
+  const Index k = static_cast<Index>(tets.rows());
+  Vec volumes(k);
+#pragma omp parallel for schedule(static)
+  for (Index t = 0; t < k; ++t) {
     const Eigen::RowVector3d a = points.row(tets(t, 0));
     const Eigen::RowVector3d b = points.row(tets(t, 1)) - a;
     const Eigen::RowVector3d c = points.row(tets(t, 2)) - a;
     const Eigen::RowVector3d d = points.row(tets(t, 3)) - a;
-    volumes[t] = b.cross(c).dot(d) / 6;
+    volumes[t] = b.dot(c.cross(d)) / 6.0;
   }
   return volumes;
 }

@@ -34,16 +34,11 @@ ChartLocator::ChartLocator(area::SurfaceChart chart, const Points2Ref& turns)
       for (Index y = y0; y <= y1; ++y)
         for (Index x = x0; x <= x1; ++x) {
           const Index cx = ((x % size_) + size_) % size_, cy = ((y % size_) + size_) % size_;
-          visit(static_cast<std::size_t>(cx + size_ * cy), f);
+          visit(cx + size_ * cy, f);
         }
     }
   };
-  start_.assign(static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_) + 1, 0);
-  for_cells([&](std::size_t c, Index) { ++start_[c + 1]; });
-  for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
-  face_.resize(static_cast<std::size_t>(start_.back()));
-  std::vector<Index> next(start_.begin(), start_.end() - 1);
-  for_cells([&](std::size_t c, Index f) { face_[static_cast<std::size_t>(next[c]++)] = f; });
+  faces_ = Incidence<>(size_ * size_, for_cells);
 }
 
 Index ChartLocator::wrap(double coordinate) const {
@@ -52,12 +47,9 @@ Index ChartLocator::wrap(double coordinate) const {
 }
 
 ChartLocator::Hit ChartLocator::find(const Eigen::Vector2d& q) const {
-  const std::size_t c = static_cast<std::size_t>(wrap(q.x())) +
-                        static_cast<std::size_t>(size_) * static_cast<std::size_t>(wrap(q.y()));
   Hit best;
   double least = -kSlack;
-  for (Index e = start_[c]; e < start_[c + 1]; ++e) {
-    const Index f = face_[static_cast<std::size_t>(e)];
+  for (const Index f : faces_[wrap(q.x()) + size_ * wrap(q.y())]) {
     Eigen::Matrix<double, 2, 3> x;
     for (int k = 0; k < 3; ++k) x.col(k) = chart_.corner(turns_, f, k);
     const Eigen::Vector2d centre = x.rowwise().mean();

@@ -2,29 +2,15 @@
 
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "stretchmap/area/triangle_energy.hpp"
+#include "stretchmap/base/incidence.hpp"
+#include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::registration {
 namespace {
 
 constexpr int kDirections = 8;
-
-// Faces round each vertex.
-struct Rings {
-  explicit Rings(const area::SurfaceChart& chart)
-      : start(chart.n_vertices + 1, 0), face(chart.faces.size()) {
-    const Index m = static_cast<Index>(chart.faces.rows());
-    for (Index f = 0; f < m; ++f)
-      for (int k = 0; k < 3; ++k) ++start[chart.faces(f, k) + 1];
-    for (Index i = 0; i < chart.n_vertices; ++i) start[i + 1] += start[i];
-    std::vector<Index> cursor(start.begin(), start.end() - 1);
-    for (Index f = 0; f < m; ++f)
-      for (int k = 0; k < 3; ++k) face[cursor[chart.faces(f, k)]++] = f;
-  }
-  std::vector<Index> start, face;
-};
 
 double face_value(const area::SurfaceChart& chart, const Points2& y, const Points& X,
                   const RowsRef& rest, Index f) {
@@ -51,7 +37,7 @@ class Search {
         weights_(weights),
         y_(y),
         X_(X),
-        rings_(chart) {}
+        corners_(corners_at(chart.faces, chart.n_vertices)) {}
 
   // Tries one vertex; returns by how much the energy fell, 0 if it stays.
   double improve(Index i, double reach) {
@@ -63,7 +49,7 @@ class Search {
     Eigen::RowVector3d best_X = X;
     const Eigen::Matrix2d steps = target_.steps(y);
     for (int d = 0; d < kDirections; ++d) {
-      const double angle = 2.0 * M_PI * d / kDirections;
+      const double angle = kTwoPi * d / kDirections;
       const Eigen::Vector2d way(std::cos(angle), std::sin(angle));
       y_.row(i) = y + (reach * steps * way).transpose();
       Eigen::RowVector3d there;
@@ -80,8 +66,8 @@ class Search {
  private:
   double ring_value(Index i) const {
     double total = 0.0;
-    for (Index p = rings_.start[i]; p < rings_.start[i + 1]; ++p) {
-      const Index f = rings_.face[p];
+    for (const Index corner : corners_[i]) {
+      const Index f = corner / 3;
       total += weights_[f] * face_value(chart_, y_, X_, rest_, f);
       if (!std::isfinite(total)) return std::numeric_limits<double>::infinity();
     }
@@ -94,7 +80,7 @@ class Search {
   const VecRef& weights_;
   Points2& y_;
   Points& X_;
-  Rings rings_;
+  Incidence<> corners_;
 };
 
 }  // namespace

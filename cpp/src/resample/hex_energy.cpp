@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "stretchmap/base/incidence.hpp"
 #include "stretchmap/base/parallel.hpp"
 #include "stretchmap/linalg/pattern.hpp"
 
@@ -47,19 +48,12 @@ void tet_blocks(const ElementBatch& batch, int c, double slope, RowMatrix3d (&H)
 
 HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
   const Index k = static_cast<Index>(hexes_.rows());
-  std::vector<Index> start(n + 1, 0), around(8 * static_cast<std::size_t>(k));
-  for (Index h = 0; h < k; ++h)
-    for (int c = 0; c < 8; ++c) ++start[hexes_(h, c) + 1];
-  for (Index i = 0; i < n; ++i) start[i + 1] += start[i];
-  std::vector<Index> cursor(start.begin(), start.end() - 1);
-  for (Index h = 0; h < k; ++h)
-    for (int c = 0; c < 8; ++c) around[cursor[hexes_(h, c)]++] = 8 * h + c;
-
+  const Incidence<> corners = corners_at(hexes_, n);
   const auto coupled = coupled_corners();
   const linalg::Pattern pattern = linalg::build_pattern(n, n, [&](Index i, linalg::RowSet& row) {
-    for (Index p = start[i]; p < start[i + 1]; ++p)
+    for (const Index corner : corners[i])
       for (int b = 0; b < 8; ++b)
-        if (coupled[around[p] % 8][b]) row.add(hexes_(around[p] / 8, b));
+        if (coupled[corner % 8][b]) row.add(hexes_(corner / 8, b));
   });
   row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n + 1);
   col_ = Eigen::Map<const IndexVec>(pattern.col.data(), row_ptr_[n]);
@@ -73,7 +67,7 @@ HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
   part_hexes_.resize(chunk_count(n));
   for_chunks(n, [&](Index begin, Index end) {
     std::vector<Index>& list = part_hexes_[begin / kChunk];
-    for (Index p = start[begin]; p < start[end]; ++p) list.push_back(around[p] / 8);
+    for (const Index corner : corners.of(begin, end)) list.push_back(corner / 8);
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
   });

@@ -9,12 +9,12 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-TorusSurface::TorusSurface(double R, double r) : R_(R), r_(r) {}
+TorusSurface::TorusSurface(double R, double r) : torus_{R, r} {}
 
 Matrix3d TorusSurface::frame(const Vector3d& x) const {
   const double rho = x.head<2>().norm();
   const double cu = x[0] / rho, su = x[1] / rho;
-  const double v = std::atan2(x[2], rho - R_);
+  const double v = std::atan2(x[2], rho - torus_.R);
   const double cv = std::cos(v), sv = std::sin(v);
   Matrix3d Q;
   Q.col(0) << -su, cu, 0.0;
@@ -24,40 +24,39 @@ Matrix3d TorusSurface::frame(const Vector3d& x) const {
 }
 
 Vector3d TorusSurface::outward(const Vector3d& x) const {
-  const double share = 1.0 - R_ / x.head<2>().norm();
+  const double share = 1.0 - torus_.R / x.head<2>().norm();
   return Vector3d(share * x[0], share * x[1], x[2]).normalized();
 }
 
 Matrix3d TorusSurface::outward_derivative(const Vector3d& x) const {
-  const double rho = x.head<2>().norm(), share = 1.0 - R_ / rho;
+  const double rho = x.head<2>().norm(), share = 1.0 - torus_.R / rho;
   const Vector3d along(-x[1] / rho, x[0] / rho, 0.0);
   const Vector3d off(share * x[0], share * x[1], x[2]);
   const double length = off.norm();
   const Vector3d n = off / length;
   return (Matrix3d::Identity() - n * n.transpose()) / length *
-         (Matrix3d::Identity() - R_ / rho * along * along.transpose());
+         (Matrix3d::Identity() - torus_.R / rho * along * along.transpose());
 }
 
 Vector3d TorusSurface::moved(const Vector3d& x, const Vector2d& step) const {
   const double rho = x.head<2>().norm();
   const double u = std::atan2(x[1], x[0]) + step[0] / rho;
-  const double v = std::atan2(x[2], rho - R_) + step[1] / r_;
-  const double radius = R_ + r_ * std::cos(v);
-  return {radius * std::cos(u), radius * std::sin(u), r_ * std::sin(v)};
+  const double v = std::atan2(x[2], rho - torus_.R) + step[1] / torus_.r;
+  return torus_.point(u, v);
 }
 
 // Of xi along arc length: uu is -radial / rho, vv is -normal / r, uv is -sin(v) e_u / rho, radial
 // being cos(v) normal - sin(v) e_v.
 Matrix2d TorusSurface::bending(const Vector3d& x, const Vector3d& g) const {
   const double rho = x.head<2>().norm();
-  const double cv = (rho - R_) / r_, sv = x[2] / r_;
+  const double cv = (rho - torus_.R) / torus_.r, sv = x[2] / torus_.r;
   Matrix2d C;
   C(0, 0) = -(cv * g[2] - sv * g[1]) / rho;
-  C(1, 1) = -g[2] / r_;
+  C(1, 1) = -g[2] / torus_.r;
   C(0, 1) = C(1, 0) = -sv * g[0] / rho;
   return C;
 }
 
-double TorusSurface::area() const { return 4.0 * EIGEN_PI * EIGEN_PI * R_ * r_; }
+double TorusSurface::area() const { return torus_.area(); }
 
 }  // namespace stretchmap::volume

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/mesh/size.hpp"
 
 namespace stretchmap::volume {
 namespace {
@@ -30,15 +31,7 @@ std::vector<Points> volume_slopes(const PointsRef& x, const TetsRef& tets) {
 }  // namespace
 
 RingProjection::RingProjection(const TetsRef& tets, const FlagsRef& fixed)
-    : tets_(tets), fixed_(fixed) {
-  const Index n = static_cast<Index>(fixed.size()), slots = static_cast<Index>(4 * tets.rows());
-  start_.assign(static_cast<std::size_t>(n) + 1, 0);
-  for (Index s = 0; s < slots; ++s) ++start_[tets(s / 4, s % 4) + 1];
-  for (Index i = 0; i < n; ++i) start_[i + 1] += start_[i];
-  incident_.resize(slots);
-  std::vector<Index> cursor(start_.begin(), start_.end() - 1);
-  for (Index s = 0; s < slots; ++s) incident_[cursor[tets(s / 4, s % 4)]++] = s;
-}
+    : tets_(tets), fixed_(fixed), corners_(corners_at(tets, static_cast<Index>(fixed.size()))) {}
 
 Vec RingProjection::rings(const VecRef& tet_values) const {
   const Index n = static_cast<Index>(fixed_.size());
@@ -46,7 +39,7 @@ Vec RingProjection::rings(const VecRef& tet_values) const {
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < n; ++i) {
     if (fixed_[i]) continue;
-    for (Index p = start_[i]; p < start_[i + 1]; ++p) sums[i] += tet_values[incident_[p] / 4];
+    for (const Index corner : corners_[i]) sums[i] += tet_values[corner / 4];
   }
   return sums;
 }
@@ -61,8 +54,8 @@ Points RingProjection::transposed(const std::vector<Points>& slopes, const Vec& 
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < n; ++i) {
     if (fixed_[i]) continue;
-    for (Index p = start_[i]; p < start_[i + 1]; ++p)
-      d.row(i) += tet[incident_[p] / 4] * slopes[incident_[p] % 4].row(incident_[p] / 4);
+    for (const Index corner : corners_[i])
+      d.row(i) += tet[corner / 4] * slopes[corner % 4].row(corner / 4);
   }
   return d;
 }
@@ -80,7 +73,7 @@ Vec RingProjection::forward(const std::vector<Points>& slopes, const Points& d) 
 }
 
 double RingProjection::error(const PointsRef& x, const VecRef& target) const {
-  const Vec current = rings(signed_tet_volumes(x, tets_));
+  const Vec current = rings(mesh::tet_volumes(x, tets_));
   double worst = 0.0;
   for (Index i = 0; i < fixed_.size(); ++i)
     if (!fixed_[i]) worst = std::max(worst, std::abs(current[i] / target[i] - 1.0));
@@ -93,7 +86,7 @@ RingStep RingProjection::step(const PointsRef& x, const VecRef& target, double t
   result.error = error(x, target);
   result.x = x;
   const std::vector<Points> slopes = volume_slopes(x, tets_);
-  Vec residual = rings(signed_tet_volumes(x, tets_));
+  Vec residual = rings(mesh::tet_volumes(x, tets_));
   for (Index i = 0; i < fixed_.size(); ++i) residual[i] = fixed_[i] ? 0.0 : target[i] - residual[i];
 
   const double goal = tol * residual.norm();

@@ -1,7 +1,7 @@
 // How SolidEnergy numbers its rows and elements, and the block pattern of its Hessian.
 #include <algorithm>
-#include <numeric>
 
+#include "stretchmap/base/incidence.hpp"
 #include "stretchmap/linalg/pattern.hpp"
 #include "stretchmap/volume/solid_energy.hpp"
 
@@ -55,16 +55,16 @@ SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
   for (Index row = 0; row < row_vertex_.size(); ++row) vertex_row_[row_vertex_[row]] = row;
 
   // Tets by their lowest row, those without any at the end.
-  std::vector<Index> start(row_vertex_.size() + 2, 0), lowest(k);
-  for (Index t = 0; t < k; ++t) {
-    lowest[t] = static_cast<Index>(row_vertex_.size());
+  const auto lowest = [&](Index t) {
+    Index row = rows();
     for (int a = 0; a < 4; ++a)
-      if (vertex_row_[tets(t, a)] >= 0) lowest[t] = std::min(lowest[t], vertex_row_[tets(t, a)]);
-    ++start[lowest[t] + 1];
-  }
-  std::partial_sum(start.begin(), start.end(), start.begin());
-  order_.resize(k);
-  for (Index t = 0; t < k; ++t) order_[start[lowest[t]]++] = t;
+      if (vertex_row_[tets(t, a)] >= 0) row = std::min(row, vertex_row_[tets(t, a)]);
+    return row;
+  };
+  const Incidence<> by_row(rows() + 1, [&](const auto& visit) {
+    for (Index t = 0; t < k; ++t) visit(lowest(t), t);
+  });
+  order_ = Eigen::Map<const IndexVec>(by_row.of(0, rows() + 1).begin(), k);
   tets_.resize(k, 4);
   rest_.resize(k, 9);
   weights_.resize(k);
@@ -74,25 +74,19 @@ SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
     weights_[t] = elements.weights[order_[t]];
   }
   build_pattern();
+  find_face_slots();
+  part_rows();
 }
 
 void SolidEnergy::build_pattern() {
   const Index n_rows = rows(), k = static_cast<Index>(tets_.rows());
-  // 4 tet + corner for every corner of each row.
-  std::vector<Index> start(n_rows + 1, 0);
-  for (Index t = 0; t < k; ++t)
-    for (int a = 0; a < 4; ++a)
-      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) ++start[row + 1];
-  std::partial_sum(start.begin(), start.end(), start.begin());
-  std::vector<Index> corner(start[n_rows]), cursor(start.begin(), start.end() - 1);
-  for (Index t = 0; t < k; ++t)
-    for (int a = 0; a < 4; ++a)
-      if (const Index row = vertex_row_[tets_(t, a)]; row >= 0) corner[cursor[row]++] = 4 * t + a;
+  const Incidence<> corners =
+      corners_at(tets_, n_rows, [&](Index vertex) { return vertex_row_[vertex]; });
   const auto for_corners = [&](Index row, const auto& visit) {
-    for (Index p = start[row]; p < start[row + 1]; ++p)
+    for (const Index corner : corners[row])
       for (int b = 0; b < 4; ++b)
-        if (const Index other = vertex_row_[tets_(corner[p] / 4, b)]; other >= 0)
-          visit(corner[p], b, other);
+        if (const Index other = vertex_row_[tets_(corner / 4, b)]; other >= 0)
+          visit(corner, b, other);
   };
 
   const linalg::Pattern pattern =
@@ -114,6 +108,9 @@ void SolidEnergy::build_pattern() {
           });
         }
       });
+}
+
+void SolidEnergy::find_face_slots() {
   const Index m = barrier_.size();
   face_slot_.setConstant(m, 9, -1);
   for (Index f = 0; f < m; ++f)
@@ -123,27 +120,28 @@ void SolidEnergy::build_pattern() {
         const Index column = vertex_row_[barrier_.faces()(f, b)];
         if (row >= 0 && column >= 0) face_slot_(f, 3 * a + b) = find_block(row, column);
       }
+}
 
+// A part per thread, and which elements it has to add up.
+void SolidEnergy::part_rows() {
+  const Index n_rows = rows();
   const Index parts = std::max<Index>(1, std::min<Index>(thread_count(), n_rows));
   part_row_.resize(parts + 1);
   for (Index p = 0; p <= parts; ++p)
     part_row_[p] = static_cast<Index>(static_cast<std::int64_t>(n_rows) * p / parts);
-  const auto touching = [&](const auto& elements, int corners) {
+  const auto touching = [&](const auto& elements) {
     std::vector<std::vector<Index>> lists(parts);
-    for (Index t = 0; t < elements.rows(); ++t) {
-      for (Index p = 0; p < parts; ++p) {
-        bool touches = false;
-        for (int a = 0; a < corners; ++a) {
-          const Index row = vertex_row_[elements(t, a)];
-          touches = touches || (row >= part_row_[p] && row < part_row_[p + 1]);
-        }
-        if (touches) lists[p].push_back(t);
-      }
+    for (Index p = 0; p < parts; ++p) {
+      const auto inside = [&](Index vertex) {
+        return vertex_row_[vertex] >= part_row_[p] && vertex_row_[vertex] < part_row_[p + 1];
+      };
+      for (Index t = 0; t < elements.rows(); ++t)
+        if (elements.row(t).unaryExpr(inside).any()) lists[p].push_back(t);
     }
     return lists;
   };
-  part_tets_ = touching(tets_, 4);
-  part_faces_ = touching(barrier_.faces(), 3);
+  part_tets_ = touching(tets_);
+  part_faces_ = touching(barrier_.faces());
 }
 
 Index SolidEnergy::find_block(Index row, Index column) const {

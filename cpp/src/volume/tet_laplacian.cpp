@@ -90,18 +90,6 @@ void TetLaplacian::copy_rows(const PointsRef& x, SparseMatrix& matrix, Points& r
   }
 }
 
-Vec signed_tet_volumes(const PointsRef& x, const TetsRef& tets) {
-  Vec volumes(tets.rows());
-  const Index k = static_cast<Index>(tets.rows());
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
-    const Row3 a = x.row(tets(t, 0));
-    const Row3 b = x.row(tets(t, 1)) - a, c = x.row(tets(t, 2)) - a, d = x.row(tets(t, 3)) - a;
-    volumes[t] = b.dot(c.cross(d)) / 6.0;
-  }
-  return volumes;
-}
-
 double tet_stretch_energy(const VecRef& image_volumes, const VecRef& rest_volumes) {
   return 1.5 * (image_volumes.array().square() / rest_volumes.array()).sum();
 }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
+#include "stretchmap/base/incidence.hpp"
 #include "volume/tet_weights.hpp"
 
 namespace stretchmap::volume {
@@ -13,18 +13,6 @@ using std::size_t;
 
 // Position of the edge between two local corners among 01, 02, 03, 12, 13, 23.
 constexpr int kEdge[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
-
-// Tets around each vertex, ascending.
-struct Incidence {
-  std::vector<Index> start, tet;
-
-  Incidence(Index n, const Index* corners, Index k) : start(n + 1, 0), tet(4 * size_t(k)) {
-    for (size_t i = 0; i < tet.size(); ++i) ++start[corners[i] + 1];
-    std::partial_sum(start.begin(), start.end(), start.begin());
-    std::vector<Index> at(start.begin(), start.end() - 1);
-    for (size_t i = 0; i < tet.size(); ++i) tet[at[corners[i]]++] = static_cast<Index>(i / 4);
-  }
-};
 
 // The mesh in internal numbering.
 struct Numbered {
@@ -37,7 +25,7 @@ struct Numbered {
 
 Numbered breadth_first(const TetsRef& tets, const FlagsRef& fixed) {
   const Index n = static_cast<Index>(fixed.size()), k = static_cast<Index>(tets.rows());
-  const Incidence around(n, tets.data(), k);
+  const Incidence<> around = corners_at(tets, n);
   Numbered mesh;
   mesh.order.reserve(n);
   mesh.tet.reserve(k);
@@ -54,8 +42,8 @@ Numbered breadth_first(const TetsRef& tets, const FlagsRef& fixed) {
     for (size_t i = mesh.first_tet.size(); i < mesh.order.size(); ++i) {
       mesh.first_tet.push_back(static_cast<Index>(mesh.tet.size()));
       const Index v = mesh.order[i];
-      for (Index p = around.start[v]; p < around.start[v + 1]; ++p) {
-        const Index t = around.tet[p];
+      for (const Index corner : around[v]) {
+        const Index t = corner / 4;
         if (taken[t]) continue;
         taken[t] = 1;
         mesh.tet.push_back(t);
@@ -95,8 +83,8 @@ class Builder {
  public:
   Builder(const TetsRef& tets, const FlagsRef& fixed, const VecRef& rest)
       : mesh_(breadth_first(tets, fixed)),
-        around_(static_cast<Index>(fixed.size()), mesh_.corners.data(),
-                static_cast<Index>(tets.rows())),
+        around_(corners_at(Eigen::Map<const Tets>(mesh_.corners.data(), tets.rows(), 4),
+                           static_cast<Index>(fixed.size()))),
         n_(static_cast<Index>(fixed.size())),
         size_(chunk_size(mesh_)),
         chunks_(std::max<Index>(1, (n_ + size_ - 1) / size_)),
@@ -138,7 +126,7 @@ class Builder {
   std::vector<Index> seam_tets(Index chunk) const;
 
   Numbered mesh_;
-  Incidence around_;
+  Incidence<> around_;  // corners
   Index n_, size_, chunks_;
   const VecRef& rest_;
   TetPlan plan_;
@@ -165,8 +153,8 @@ void Builder::find_neighbours() {
     each_row(chunk, [&](Index v, Index r) {
       upper.clear();
       fixed.clear();
-      for (Index p = around_.start[v]; p < around_.start[v + 1]; ++p) {
-        const Index* corner = &mesh_.corners[4 * size_t(around_.tet[p])];
+      for (const Index at : around_[v]) {
+        const Index* corner = &mesh_.corners[4 * size_t(at / 4)];
         for (int j = 0; j < 4; ++j) {
           const Index w = corner[j];
           if (w == v || !owns(v, w) || seen[w] == v) continue;
@@ -242,10 +230,11 @@ std::vector<Index> Builder::seam_tets(Index chunk) const {
   std::vector<Index> seam;
   const Index own = mesh_.first_tet[chunk * size_];
   each_row(chunk, [&](Index v, Index) {
-    for (Index p = around_.start[v]; p < around_.start[v + 1] && around_.tet[p] < own; ++p) {
-      const Index* corner = &mesh_.corners[4 * size_t(around_.tet[p])];
+    for (const Index at : around_[v]) {
+      if (at / 4 >= own) break;
+      const Index* corner = &mesh_.corners[4 * size_t(at / 4)];
       if (std::any_of(corner, corner + 4, [&](Index w) { return w != v && owns(v, w); }))
-        seam.push_back(around_.tet[p]);
+        seam.push_back(at / 4);
     }
   });
   std::sort(seam.begin(), seam.end());
@@ -288,10 +277,9 @@ void Builder::fill_chunk(Index chunk, const std::vector<Index>& seam) {
   each_row(chunk, [&](Index v, Index r) {
     for (Index i = 0; i < upper_[r] + couples_[r]; ++i)
       slot_of[*neighbour++] = plan_.row_slot[r] + i;
-    for (Index p = around_.start[v]; p < around_.start[v + 1]; ++p) {
-      const Index t = around_.tet[p];
+    for (const Index position : around_[v]) {
+      const Index t = position / 4, here = position % 4;
       const Index* corner = &mesh_.corners[4 * size_t(t)];
-      const auto here = std::find(corner, corner + 4, v) - corner;
       std::int64_t at = -1;
       for (int j = 0; j < 4; ++j) {
         if (j == here || !owns(v, corner[j])) continue;

@@ -204,7 +204,7 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
     flips = [
         int(
             (
-                ~(_core.volume.signed_tet_volumes((1.0 - t) * solid.V + t * image, solid.T) > 0.0)
+                ~(_core.mesh.tet_volumes((1.0 - t) * solid.V + t * image, solid.T) > 0.0)
             ).sum()
         )
         for t in times

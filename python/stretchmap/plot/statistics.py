@@ -154,6 +154,6 @@ def ratios_before(result: MapResult) -> tuple[Array, str]:
     run = minimize_volumetric_stretch(
         mesh.V, mesh.T, fixed, np.array(result.image), c=0.0, max_iter=0, tol=0.0
     )
-    volumes = _core.volume.signed_tet_volumes(run.image, mesh.T)
+    volumes = _core.mesh.tet_volumes(run.image, mesh.T)
     rest = mesh.tet_volumes
     return volumes / volumes.sum() * rest.sum() / rest, "harmonic map"

@@ -18,6 +18,7 @@
 
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/base/torus.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap::area {
@@ -34,6 +35,8 @@ struct GlideProblem {
   SurfaceChart chart;
   SurfaceReference reference;
   double ratio = 2.0;  // R / r
+
+  Torus torus() const { return Torus::of_area_one(ratio); }
 };
 
 struct GlideEnergy {

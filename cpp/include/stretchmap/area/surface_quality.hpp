@@ -31,11 +31,9 @@ struct SurfaceQuality {
 SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef& faces,
                                const PointsRef& image);
 
-// Points of the torus of area one with radii ratio R / r at (u, s) in turns, s the equal-area
-// coordinate shifted by `phase` turns.
-Points torus_image(const Points2Ref& turns, double phase, double ratio);
-
-// Quality of torus_image for each candidate (phase, ratio), (k, 2), to about 1e-6.
+// Quality of the image on the torus of each candidate (phase, ratio), (k, 2), to about 1e-6: radii
+// R / r = ratio, area one, turns (n, 2) being u and the equal-area coordinate before `phase` is
+// added.
 std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
                                             const FacesRef& faces, const Points2Ref& turns,
                                             const Points2Ref& candidates);

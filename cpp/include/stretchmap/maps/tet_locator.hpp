@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
+#include "stretchmap/base/incidence.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap::maps {
@@ -33,8 +33,7 @@ class TetLocator {
   double tolerance_;
   Eigen::Vector3d low_, high_, inverse_cell_;
   Eigen::Array3i size_;
-  std::vector<std::int64_t> start_;  // tets of cell c: tet_[start_[c] .. start_[c + 1])
-  std::vector<Index> tet_;
+  Incidence<Index, std::int64_t> tets_in_;  // each cell
 };
 
 }  // namespace stretchmap::maps

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <limits>
-#include <vector>
 
 #include "stretchmap/area/chart.hpp"
+#include "stretchmap/base/incidence.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap::registration {
@@ -37,9 +37,8 @@ class ChartLocator {
 
   area::SurfaceChart chart_;
   Points2 turns_;
-  Index size_;                // cells per turn
-  std::vector<Index> start_;  // faces of cell c: face_[start_[c] .. start_[c + 1])
-  std::vector<Index> face_;
+  Index size_;         // cells per turn
+  Incidence<> faces_;  // of each cell
 };
 
 }  // namespace stretchmap::registration

@@ -2,7 +2,7 @@
 // how a point moves. Nothing else in this folder knows what surface it is.
 #pragma once
 
-#include "stretchmap/base/types.hpp"
+#include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::volume {
 
@@ -43,7 +43,7 @@ class TorusSurface final : public GlideSurface {
   double area() const override;
 
  private:
-  double R_, r_;
+  Torus torus_;
 };
 
 }  // namespace stretchmap::volume

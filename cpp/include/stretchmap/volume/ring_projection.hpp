@@ -8,7 +8,7 @@
 
 #include <vector>
 
-#include "stretchmap/volume/tet_laplacian.hpp"
+#include "stretchmap/base/incidence.hpp"
 
 namespace stretchmap::volume {
 
@@ -38,8 +38,7 @@ class RingProjection {
 
   Tets tets_;
   Flags fixed_;
-  std::vector<Index> start_;     // per vertex, its incident tets
-  std::vector<Index> incident_;  // as 4 * tet + corner
+  Incidence<> corners_;  // of the tets round each vertex
 };
 
 }  // namespace stretchmap::volume

@@ -81,6 +81,8 @@ class SolidEnergy {
                    void (*evaluate)(ElementBatch&, const EnergyWeights&), const Item& item,
                    const Visit& visit) const;
   void build_pattern();
+  void find_face_slots();
+  void part_rows();
   Index find_block(Index row, Index column) const;  // position in col_
   void add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
                    Points& gradient, double* blocks) const;

@@ -50,9 +50,6 @@ class TetLaplacian {
   std::vector<double> sums_;  // and one number per edge
 };
 
-// Signed volumes (k) of the tets with vertex positions x (n, 3).
-Vec signed_tet_volumes(const PointsRef& x, const TetsRef& tets);
-
 // Volumetric stretch energy (5.1) at c = 0, 3/2 sum |f(tau)|^2 / |tau|; rest volumes positive.
 double tet_stretch_energy(const VecRef& image_volumes, const VecRef& rest_volumes);
 

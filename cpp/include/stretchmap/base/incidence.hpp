@@ -1,0 +1,60 @@
+// What meets each of n things: the tets round a vertex, the edges round it, the boxes in a cell.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "stretchmap/base/types.hpp"
+
+namespace stretchmap {
+
+// \tparam Item what is listed. \tparam Offset counts all items together.
+template <class Item = Index, class Offset = Index>
+class Incidence {
+ public:
+  Incidence() = default;
+
+  // A counting sort. enumerate(visit) has to call visit(thing, item) for every pair, the same ones
+  // both times it is called; things are below n, and the items of each keep this order.
+  template <class Enumerate>
+  Incidence(Index n, const Enumerate& enumerate) : start_(static_cast<std::size_t>(n) + 1, 0) {
+    enumerate([&](Index thing, const Item&) { ++start_[static_cast<std::size_t>(thing) + 1]; });
+    for (std::size_t i = 1; i < start_.size(); ++i) start_[i] += start_[i - 1];
+    items_.resize(static_cast<std::size_t>(start_.back()));
+    std::vector<Offset> next(start_.begin(), start_.end() - 1);
+    enumerate([&](Index thing, const Item& item) { items_[next[thing]++] = item; });
+  }
+
+  struct Range {
+    const Item *first, *last;
+    const Item* begin() const { return first; }
+    const Item* end() const { return last; }
+  };
+  Range operator[](Index thing) const { return of(thing, thing + 1); }
+  // Of all things in [first, last).
+  Range of(Index first, Index last) const {
+    return {items_.data() + start_[first], items_.data() + start_[last]};
+  }
+
+ private:
+  std::vector<Offset> start_;  // (n + 1)
+  std::vector<Item> items_;
+};
+
+// (n) the corners at each vertex, as width * element + corner of the rows of `elements` (m, width),
+// ascending; entries for which row_of(vertex) is negative are in none.
+template <class Elements, class RowOf>
+Incidence<> corners_at(const Elements& elements, Index n, const RowOf& row_of) {
+  const Index m = static_cast<Index>(elements.rows()), width = static_cast<Index>(elements.cols());
+  return Incidence<>(n, [&](const auto& visit) {
+    for (Index e = 0; e < m; ++e)
+      for (Index k = 0; k < width; ++k)
+        if (const Index row = row_of(elements(e, k)); row >= 0) visit(row, width * e + k);
+  });
+}
+template <class Elements>
+Incidence<> corners_at(const Elements& elements, Index n) {
+  return corners_at(elements, n, [](Index vertex) { return vertex; });
+}
+
+}  // namespace stretchmap
