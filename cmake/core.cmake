@@ -13,7 +13,7 @@ if(MSVC)
 else()
   set(warnings -Wall -Wextra -Wpedantic -Wshadow)
   set(strict $<$<BOOL:${STRETCHMAP_WERROR}>:-Werror>)
-  # Nobody reads errno or traps: without them loops with roots and choices can be vectorised.
+  # Nobody reads errno or traps: without them loops with roots and choices can be vectorized.
   target_compile_options(stretchmap_core PRIVATE ${warnings} -fno-math-errno -fno-trapping-math
                                                  ${strict})
 endif()

@@ -55,7 +55,7 @@ Disk disk(Index n) {
 }
 
 // Three tets per prism, cut from the lowest to the highest vertex number of the disk so that
-// neighbours agree.
+// neighbors agree.
 void add_prism(std::array<Index, 3> corner, Index here, Index there, Tets& tets, Index& t) {
   std::sort(corner.begin(), corner.end());
   const auto [a, b, c] = corner;

@@ -30,7 +30,7 @@ void set_values(double* target, Eigen::Index size, const VecRef& values) {
 template <int K>
 Vec solve_once(const SparseMatrix& matrix, const VecRef& right) {
   linalg::BlockLdlt<K> factor(matrix);
-  factor.factorise(matrix);
+  factor.factorize(matrix);
   return factor.solve(right);
 }
 
@@ -38,8 +38,8 @@ void bind_mesh(py::module_& m) {
   m.def("orient3d", &orient3d, py::arg("a"), py::arg("b"), py::arg("c"), py::arg("d"));
   m.def("orient2d", &orient2d, py::arg("a"), py::arg("b"), py::arg("c"), py::arg("axis"));
   m.def(
-      "tet_neighbours",
-      [](const TetsRef& tets, Index n) { return mesh::tet_neighbours(tets, n, signal_poll()); },
+      "tet_neighbors",
+      [](const TetsRef& tets, Index n) { return mesh::tet_neighbors(tets, n, signal_poll()); },
       py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil());
 }
 
@@ -188,7 +188,7 @@ void bind_volume(py::module_& m) {
             {std::make_shared<volume::TorusSurface>(R, r), faces, rest, Vec::Ones(faces.rows())});
         Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
         Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
-        barrier.linearise(x, 0, epsilon, gradient, hessian);
+        barrier.linearize(x, 0, epsilon, gradient, hessian);
         return std::make_tuple(barrier.value(x, 0, epsilon).energy, gradient, hessian);
       },
       py::arg("x").noconvert(), py::arg("faces").noconvert(), py::arg("rest").noconvert(),

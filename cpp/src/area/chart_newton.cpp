@@ -116,7 +116,7 @@ ChartStep ChartNewton::step(const TriangleWeights& weights, double reach, const 
   for (Index i = 0; i < matrix.rows(); ++i) matrix.coeffRef(i, i) += ridge;
   if (poll) poll();
   if (!solver_) solver_.emplace(matrix);
-  solver_->factorise(matrix, poll);
+  solver_->factorize(matrix, poll);
   const Vec solution = solver_->solve(-gradient);
   Points2 direction = Eigen::Map<const Points2>(solution.data(), chart_.n_vertices, 2);
   direction.rowwise() -= direction.colwise().mean();  // translations cost nothing

@@ -55,7 +55,7 @@ GlideStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
   const double scale = best_scale(problem_, angles_);
   const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
   if (poll) poll();
-  factorise(here.hessians, poll);
+  factorize(here.hessians, poll);
   const Vec flat = solver_->solve(-here.gradient);
   const Points2 direction = without_rotation(as_rows(flat));
 
@@ -75,13 +75,13 @@ GlideStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
   return result;
 }
 
-void SurfaceNewton::factorise(const Rows& hessians, const Poll& poll) {
+void SurfaceNewton::factorize(const Rows& hessians, const Poll& poll) {
   SparseMatrix matrix = pattern_.zeros();
   pattern_.scatter(hessians, matrix.valuePtr());
   const double ridge = kRidge * Vec(matrix.diagonal()).mean();
   for (Index i = 0; i < matrix.rows(); ++i) matrix.coeffRef(i, i) += ridge;
   if (!solver_) solver_.emplace(matrix);
-  solver_->factorise(matrix, poll);
+  solver_->factorize(matrix, poll);
 }
 
 // At most 1, and at most nine tenths of the way to the first face of no area in the (u, v) chart.

@@ -6,7 +6,7 @@ namespace stretchmap::area {
 
 namespace {
 
-// Each vertex and its neighbours, ascending.
+// Each vertex and its neighbors, ascending.
 std::vector<std::vector<Index>> adjacency(const FacesRef& faces, Index n) {
   std::vector<std::vector<Index>> rows(static_cast<std::size_t>(n));
   for (Index f = 0; f < faces.rows(); ++f)

@@ -11,7 +11,7 @@ namespace stretchmap::area {
 namespace {
 
 // A little give in the ring equations makes the system quasi-definite, and then it has a
-// factorisation in any order. The solution is refined against the equations without it.
+// factorization in any order. The solution is refined against the equations without it.
 constexpr double kGive = 1e-9;
 constexpr double kRidge = 1e-10;  // holds the rotation about the axis
 constexpr int kRefinements = 3;
@@ -92,7 +92,7 @@ Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weig
       right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
     const SparseMatrix yielding = with_give(exact_);
     if (!factor_) factor_.emplace(yielding);
-    factor_->factorise(yielding, poll);
+    factor_->factorize(yielding, poll);
   }
   Vec solution = factor_->solve(right);
   for (int i = 0; i < kRefinements; ++i) {

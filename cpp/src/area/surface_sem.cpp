@@ -18,7 +18,7 @@ SparseMatrix pinned(SparseMatrix matrix) {
 }
 
 // Minimum on (0, longest] of a quartic with coefficients c[0..4] that descends at 0.
-double minimise_quartic(const double (&c)[5], double longest) {
+double minimize_quartic(const double (&c)[5], double longest) {
   const auto slope = [&](double t) {
     return c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * 4.0 * c[4]));
   };
@@ -75,7 +75,7 @@ double SurfaceSem::line_search(const Points2& direction) const {
     c[3] += 2.0 * w * linear(f) * quadratic(f);
     c[4] += w * quadratic(f) * quadratic(f);
   }
-  return c[1] < 0.0 ? minimise_quartic(c, unfolded_step(chart_, turns_, direction, 0.95, 2.0))
+  return c[1] < 0.0 ? minimize_quartic(c, unfolded_step(chart_, turns_, direction, 0.95, 2.0))
                     : 0.0;
 }
 

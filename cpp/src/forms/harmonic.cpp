@@ -37,7 +37,7 @@ HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const V
       pinned_laplacian(n_vertices, edges, weights));
   if (solver.info() != Eigen::Success) {
     throw Error("SolverError",
-                "the surface Laplacian could not be factorised; look for degenerate faces with "
+                "the surface Laplacian could not be factorized; look for degenerate faces with "
                 "diagnose()");
   }
   Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(n_vertices, eta.rows());

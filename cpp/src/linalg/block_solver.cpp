@@ -15,11 +15,11 @@ Rows translations(Index n) {
 }
 
 Rows rigid_body_modes(const PointsRef& points) {
-  const Eigen::RowVector3d centre = points.colwise().mean();
-  const double scale = (points.rowwise() - centre).rowwise().norm().maxCoeff();
+  const Eigen::RowVector3d center = points.colwise().mean();
+  const double scale = (points.rowwise() - center).rowwise().norm().maxCoeff();
   Rows modes = Rows::Zero(3 * points.rows(), 6);
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    const Eigen::RowVector3d p = (points.row(i) - centre) / (scale > 0.0 ? scale : 1.0);
+    const Eigen::RowVector3d p = (points.row(i) - center) / (scale > 0.0 ? scale : 1.0);
     modes.block<3, 3>(3 * i, 0).setIdentity();
     for (int axis = 0; axis < 3; ++axis)
       modes.block<3, 1>(3 * i, 3 + axis) = Eigen::Vector3d::Unit(axis).cross(p.transpose());

@@ -1,4 +1,4 @@
-// An ordering of the unknowns in which neighbours are close.
+// An ordering of the unknowns in which neighbors are close.
 #pragma once
 
 #include <vector>

@@ -14,7 +14,7 @@ namespace stretchmap::linalg {
 namespace {
 
 // A triangulated surface has 7 entries per row, a tetrahedral mesh up to 15; the fill of their
-// factors differs far more. The limits are where a factorisation costs as much as a multigrid
+// factors differs far more. The limits are where a factorization costs as much as a multigrid
 // solve.
 std::string choose_backend(const SparseMatrix& A) {
   const double density = static_cast<double>(A.nonZeros()) / std::max<double>(1.0, A.rows());

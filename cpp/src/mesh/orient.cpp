@@ -107,16 +107,16 @@ Patches tet_patches(const TetsRef& tets, const FacetGroups& half_faces, const Ma
 }
 
 Mask faces_to_turn(const PointsRef& points, const FacesRef& faces, const Patches& patches) {
-  const Eigen::RowVector3d centre = points.colwise().mean();
+  const Eigen::RowVector3d center = points.colwise().mean();
   std::vector<double> votes(patches.count, 0);
   for (Index f = 0; f < faces.rows(); ++f) {
     const Index p = patches.patch[f];
     if (p < 0) continue;
     double vote = 1;
     if (patches.closed[p]) {
-      const Eigen::RowVector3d a = points.row(faces(f, 0)) - centre;
-      const Eigen::RowVector3d b = points.row(faces(f, 1)) - centre;
-      vote = a.cross(b).dot(points.row(faces(f, 2)) - centre);
+      const Eigen::RowVector3d a = points.row(faces(f, 0)) - center;
+      const Eigen::RowVector3d b = points.row(faces(f, 1)) - center;
+      vote = a.cross(b).dot(points.row(faces(f, 2)) - center);
     }
     votes[p] += patches.turned[f] ? -vote : vote;
   }

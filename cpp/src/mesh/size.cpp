@@ -54,12 +54,12 @@ Vec tet_volumes(const PointsRef& points, const TetsRef& tets) {
 }
 
 double enclosed_volume(const PointsRef& points, const FacesRef& faces) {
-  const Eigen::RowVector3d centre = points.colwise().mean();
+  const Eigen::RowVector3d center = points.colwise().mean();
   double volume = 0;
   for (Index f = 0; f < faces.rows(); ++f) {
-    const Eigen::RowVector3d a = points.row(faces(f, 0)) - centre;
-    const Eigen::RowVector3d b = points.row(faces(f, 1)) - centre;
-    const Eigen::RowVector3d c = points.row(faces(f, 2)) - centre;
+    const Eigen::RowVector3d a = points.row(faces(f, 0)) - center;
+    const Eigen::RowVector3d b = points.row(faces(f, 1)) - center;
+    const Eigen::RowVector3d c = points.row(faces(f, 2)) - center;
     volume += a.cross(b).dot(c);
   }
   return volume / 6;

@@ -9,7 +9,7 @@
 
 namespace stretchmap::mesh {
 
-IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices, const Poll& poll) {
+IndexVec tet_neighbors(const TetsRef& tets, Index n_vertices, const Poll& poll) {
   const FacetGroups groups = group_half_faces(tets, n_vertices, {}, poll);
   IndexVec twin = IndexVec::Constant(4 * tets.rows(), -1);
   for (Index g = 0; g < groups.size(); ++g) {
@@ -33,7 +33,7 @@ IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices, const Poll& poll)
 }
 
 TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  const IndexVec twin = tet_neighbours(tets, n_vertices, poll);
+  const IndexVec twin = tet_neighbors(tets, n_vertices, poll);
   TetBoundary boundary;
   const Index n_faces = static_cast<Index>((twin.array() < 0).count());
   boundary.faces.resize(n_faces, 3);

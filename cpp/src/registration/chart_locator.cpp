@@ -52,8 +52,8 @@ ChartLocator::Hit ChartLocator::find(const Eigen::Vector2d& q) const {
   for (const Index f : faces_[wrap(q.x()) + size_ * wrap(q.y())]) {
     Eigen::Matrix<double, 2, 3> x;
     for (int k = 0; k < 3; ++k) x.col(k) = chart_.corner(turns_, f, k);
-    const Eigen::Vector2d centre = x.rowwise().mean();
-    const Eigen::Vector2d p = q + (centre - q).array().round().matrix();
+    const Eigen::Vector2d center = x.rowwise().mean();
+    const Eigen::Vector2d p = q + (center - q).array().round().matrix();
     x.colwise() -= p;
     const Eigen::Vector3d w(cross(x.col(1), x.col(2)), cross(x.col(2), x.col(0)),
                             cross(x.col(0), x.col(1)));

@@ -16,7 +16,7 @@ using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Block = Eigen::Map<RowMatrix3d>;
 using volume::ElementBatch;
 
-// Directions (0, 1, 2) of the edges from each corner to its three neighbours.
+// Directions (0, 1, 2) of the edges from each corner to its three neighbors.
 constexpr int kDirection[8][3] = {{0, 1, 2}, {1, 0, 2}, {0, 1, 2}, {1, 0, 2},
                                   {1, 0, 2}, {0, 1, 2}, {1, 0, 2}, {0, 1, 2}};
 
@@ -176,7 +176,7 @@ void HexEnergy::add(const ElementBatch& batch, double power, Index h, Index firs
   }
 }
 
-void HexEnergy::linearise(const PointsRef& x, const HexWeights& w, Points& gradient,
+void HexEnergy::linearize(const PointsRef& x, const HexWeights& w, Points& gradient,
                           linalg::BlockMatrix& hessian) const {
   gradient.setZero(n_, 3);
   hessian.values.setZero();

@@ -18,10 +18,10 @@ bool HexNewton::step(Points& x, const HexWeights& w, const HexNewtonOptions& opt
   Points gradient;
   if (!solver_) {
     linalg::BlockMatrix hessian = energy_.pattern();
-    energy_.linearise(x, w, gradient, hessian);
+    energy_.linearize(x, w, gradient, hessian);
     solver_ = std::make_unique<linalg::BlockSolver>(std::move(hessian));
   } else {
-    energy_.linearise(x, w, gradient, solver_->matrix());
+    energy_.linearize(x, w, gradient, solver_->matrix());
     solver_->refactor();
   }
   linalg::SolveOptions solve;

@@ -52,15 +52,15 @@ double middle_of_edge(const Corners& x, int d, const std::array<int, 3>& e, doub
 
 // The mean of a three by three net whose second mixed difference vanishes: (2 sum of the middles of
 // the sides - sum of the corners) / 4.
-double middle_of_face(const Coefficients& b, int centre, int p, int q) {
-  const double sides = b[centre - p] + b[centre + p] + b[centre - q] + b[centre + q];
-  const double ends = b[centre - p - q] + b[centre - p + q] + b[centre + p - q] + b[centre + p + q];
+double middle_of_face(const Coefficients& b, int center, int p, int q) {
+  const double sides = b[center - p] + b[center + p] + b[center - q] + b[center + q];
+  const double ends = b[center - p - q] + b[center - p + q] + b[center + p - q] + b[center + p + q];
   return 0.5 * sides - 0.25 * ends;
 }
 
 // What rounding can do to a coefficient. With u half an epsilon and edges no longer than s in any
 // coordinate a determinant is below 6 s^3 and off by less than 40 u s^3, the coefficients of edges,
-// faces, centre below 18, 42, 102 s^3 and off by less than 120, 280, 680 u s^3; each halving adds
+// faces, center below 18, 42, 102 s^3 and off by less than 120, 280, 680 u s^3; each halving adds
 // 2 u times the largest of them: 680 + 204 kMostHalvings < 16384.
 double rounding_bound(const Corners& x) {
   Vector3d low = x[0], high = x[0];

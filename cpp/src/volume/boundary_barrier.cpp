@@ -48,12 +48,12 @@ FaceReport BoundaryBarrier::value(const PointsRef& x, Index f, double epsilon) c
   }
   const double I = s.J.squaredNorm();
   for (const double sigma : s.sigma)
-    report.energy += 0.5 * (I + sigma * sigma + 1.0) / regularised(sigma, epsilon).value - 2.0;
+    report.energy += 0.5 * (I + sigma * sigma + 1.0) / regularized(sigma, epsilon).value - 2.0;
   report.energy *= 0.25 * boundary_.weights[f];
   return report;
 }
 
-void BoundaryBarrier::linearise(const PointsRef& x, Index f, double epsilon,
+void BoundaryBarrier::linearize(const PointsRef& x, Index f, double epsilon,
                                 Eigen::Matrix<double, 6, 1>& gradient,
                                 Eigen::Matrix<double, 6, 6>& hessian) const {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -83,7 +83,7 @@ void BoundaryBarrier::linearise(const PointsRef& x, Index f, double epsilon,
     }
 
     const double sigma = s.sigma[k], N = I + sigma * sigma + 1.0;
-    const Regularised chi = regularised(sigma, epsilon);
+    const Regularized chi = regularized(sigma, epsilon);
     const double q = 1.0 / chi.value, t = chi.first * q;
     gradient += weight * q * (slope + (sigma - 0.5 * N * t) * d);
     // (J, sigma, chi) -> (|J|^2 + sigma^2 + 1) / (2 chi) is convex.

@@ -70,7 +70,7 @@ struct Terms {
 STRETCHMAP_INLINE void terms(const Lane& det, const EnergyWeights& w, Terms& t) {
   alignas(64) Lane chi, chi1, chi2, root;
   for (int l = 0; l < kLanes; ++l) {
-    const Regularised r = regularised(det[l], w.epsilon);
+    const Regularized r = regularized(det[l], w.epsilon);
     chi[l] = r.value;
     chi1[l] = r.first;
     chi2[l] = r.second;

@@ -161,7 +161,7 @@ void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Inde
   }
 }
 
-void SolidEnergy::linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+void SolidEnergy::linearize(const PointsRef& x, const EnergyWeights& w, Points& gradient,
                             linalg::BlockMatrix* hessian) const {
   gradient.setZero(rows(), 3);
   double* blocks = nullptr;
@@ -197,7 +197,7 @@ void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, 
                            Index last, Points& gradient, double* blocks) const {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-  barrier_.linearise(x, f, w.epsilon, g, H);
+  barrier_.linearize(x, f, w.epsilon, g, H);
   for (int a = 0; a < 3; ++a) {
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;

@@ -60,16 +60,16 @@ void SolidNewton::try_held_back(Points& x, const Points& start, Points& directio
 
 // The Hessian and its preconditioner. Sums of terms of very different size can come out indefinite
 // in rounding, so the diagonal grows until they serve; false if the matrix is not even finite.
-bool SolidNewton::linearise(const PointsRef& x, const EnergyWeights& w) {
+bool SolidNewton::linearize(const PointsRef& x, const EnergyWeights& w) {
   for (const double shift : kShifts) {
     try {
       if (solver_) {
-        energy_.linearise(x, w, gradient_, &solver_->matrix());
+        energy_.linearize(x, w, gradient_, &solver_->matrix());
         stiffen(solver_->matrix(), shift);
         solver_->refactor();
       } else {
         BlockMatrix hessian = energy_.pattern();
-        energy_.linearise(x, w, gradient_, &hessian);
+        energy_.linearize(x, w, gradient_, &hessian);
         stiffen(hessian, shift);
         solver_ =
             std::make_unique<linalg::BlockSolver>(std::move(hessian), energy_.near_nullspace(x));
@@ -86,10 +86,10 @@ bool SolidNewton::linearise(const PointsRef& x, const EnergyWeights& w) {
 bool SolidNewton::renew(const PointsRef& x, const EnergyWeights& w, bool keep) {
   keep = keep && solver_ && last_step_.size() > 0;
   if (keep) {
-    energy_.linearise(x, w, gradient_, nullptr);
+    energy_.linearize(x, w, gradient_, nullptr);
   } else {
     changes_.clear();
-    if (!linearise(x, w)) return false;
+    if (!linearize(x, w)) return false;
   }
   const Vec gradient = Eigen::Map<const Vec>(gradient_.data(), gradient_.size());
   if (keep && !new_targets_) {

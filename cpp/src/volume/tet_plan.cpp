@@ -92,7 +92,7 @@ class Builder {
 
   TetPlan build() {
     number_rows();
-    find_neighbours();
+    find_neighbors();
     lay_out();
     fill_rows();
     fill_tets();
@@ -102,7 +102,7 @@ class Builder {
 
  private:
   Index chunk_end(Index chunk) const { return std::min(n_, (chunk + 1) * size_); }
-  // Whether the edge between free internal vertex v and neighbour j is summed by v.
+  // Whether the edge between free internal vertex v and neighbor j is summed by v.
   bool owns(Index v, Index j) const { return j > v || mesh_.row[j] < 0; }
 
   template <class Visit>
@@ -118,7 +118,7 @@ class Builder {
   }
 
   void number_rows();
-  void find_neighbours();
+  void find_neighbors();
   void lay_out();
   void fill_rows();
   void fill_tets();
@@ -130,9 +130,9 @@ class Builder {
   Index n_, size_, chunks_;
   const VecRef& rest_;
   TetPlan plan_;
-  std::vector<Index> upper_, couples_;          // per row, how many
-  std::vector<std::vector<Index>> neighbours_;  // per chunk, row by row: higher free ones,
-                                                // ascending, then prescribed ones, ascending
+  std::vector<Index> upper_, couples_;         // per row, how many
+  std::vector<std::vector<Index>> neighbors_;  // per chunk, row by row: higher free ones,
+                                               // ascending, then prescribed ones, ascending
 };
 
 void Builder::number_rows() {
@@ -143,13 +143,13 @@ void Builder::number_rows() {
       Eigen::Map<const IndexVec>(interior.data(), static_cast<Eigen::Index>(interior.size()));
   upper_.assign(interior.size(), 0);
   couples_.assign(interior.size(), 0);
-  neighbours_.resize(chunks_);
+  neighbors_.resize(chunks_);
 }
 
-void Builder::find_neighbours() {
+void Builder::find_neighbors() {
   each_chunk([&](Index chunk) {
     std::vector<Index> seen(n_, -1), upper, fixed;
-    std::vector<Index>& out = neighbours_[chunk];
+    std::vector<Index>& out = neighbors_[chunk];
     each_row(chunk, [&](Index v, Index r) {
       upper.clear();
       fixed.clear();
@@ -177,10 +177,10 @@ void Builder::lay_out() {
   const Index rows = plan_.rows();
   plan_.lower_start.assign(static_cast<size_t>(rows) + 1, 0);
   for (Index chunk = 0; chunk < chunks_; ++chunk) {
-    const Index* neighbour = neighbours_[chunk].data();
+    const Index* neighbor = neighbors_[chunk].data();
     each_row(chunk, [&](Index, Index r) {
-      for (Index i = 0; i < upper_[r]; ++i) ++plan_.lower_start[mesh_.row[neighbour[i]] + 1];
-      neighbour += upper_[r] + couples_[r];
+      for (Index i = 0; i < upper_[r]; ++i) ++plan_.lower_start[mesh_.row[neighbor[i]] + 1];
+      neighbor += upper_[r] + couples_[r];
     });
   }
   plan_.outer.assign(static_cast<size_t>(rows) + 1, 0);
@@ -202,7 +202,7 @@ void Builder::lay_out() {
   }
 }
 
-// Rows in ascending order enter themselves before the diagonal of their higher neighbours, so that
+// Rows in ascending order enter themselves before the diagonal of their higher neighbors, so that
 // columns ascend.
 void Builder::fill_rows() {
   plan_.inner.resize(plan_.outer.back());
@@ -210,17 +210,17 @@ void Builder::fill_rows() {
   plan_.couple_vertex.resize(plan_.couple_start.back());
   std::vector<Index> count(upper_.size(), 0);  // entries before the diagonal so far
   for (Index chunk = 0; chunk < chunks_; ++chunk) {
-    const Index* neighbour = neighbours_[chunk].data();
+    const Index* neighbor = neighbors_[chunk].data();
     each_row(chunk, [&](Index, Index r) {
       Index* after = plan_.inner.data() + plan_.outer[r + 1] - upper_[r];
       after[-1] = r;
       for (Index i = 0; i < upper_[r]; ++i) {
-        const Index column = after[i] = mesh_.row[*neighbour++];
+        const Index column = after[i] = mesh_.row[*neighbor++];
         plan_.inner[plan_.outer[column] + count[column]] = r;
         plan_.lower_slot[plan_.lower_start[column] + count[column]++] = plan_.row_slot[r] + i;
       }
       for (Index i = 0; i < couples_[r]; ++i)
-        plan_.couple_vertex[plan_.couple_start[r] + i] = mesh_.order[*neighbour++];
+        plan_.couple_vertex[plan_.couple_start[r] + i] = mesh_.order[*neighbor++];
     });
   }
 }
@@ -273,10 +273,10 @@ void Builder::fill_chunk(Index chunk, const std::vector<Index>& seam) {
     std::fill_n(&plan_.slots[6 * size_t(at)], 6, unread);
   }
   std::vector<Index> slot_of(n_);
-  const Index* neighbour = neighbours_[chunk].data();
+  const Index* neighbor = neighbors_[chunk].data();
   each_row(chunk, [&](Index v, Index r) {
     for (Index i = 0; i < upper_[r] + couples_[r]; ++i)
-      slot_of[*neighbour++] = plan_.row_slot[r] + i;
+      slot_of[*neighbor++] = plan_.row_slot[r] + i;
     for (const Index position : around_[v]) {
       const Index t = position / 4, here = position % 4;
       const Index* corner = &mesh_.corners[4 * size_t(t)];

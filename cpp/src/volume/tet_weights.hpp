@@ -13,7 +13,7 @@ struct TetWeightsTask {
   const double* rest;           // volume per tet
   const std::int32_t* slots;    // 6 per tet, the sums of edges 01, 02, 03, 12, 13, 23
   std::int64_t count;           // tets, a multiple of kTetGroup
-  double c;                     // regularisation (5.6)
+  double c;                     // regularization (5.6)
   double* sums;                 // sums[slot] += g_i . g_j / (9 (rest + c |volume|))
 };
 

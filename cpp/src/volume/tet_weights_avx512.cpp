@@ -7,6 +7,7 @@
 #ifndef __clang__
 // GCC sees its own header's "undefined" vectors as a mistake.
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 
 #include <immintrin.h>

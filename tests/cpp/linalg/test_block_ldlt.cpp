@@ -48,7 +48,7 @@ void check_against_lu(bool quasi_definite) {
   const Points normal = tests::random_points(static_cast<Index>(matrix.rows()), 9);
   const Vec right = normal.col(0);
   linalg::BlockLdlt<K> factor(matrix);
-  factor.factorise(matrix);
+  factor.factorize(matrix);
   Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix);
   const Vec expected = lu.solve(right);
   CHECK((factor.solve(right) - expected).cwiseAbs().maxCoeff() <
@@ -68,7 +68,7 @@ TEST_CASE("a singular pivot is an error") {
   SparseMatrix matrix = block_system(2, false);
   matrix.coeffs().setZero();
   linalg::BlockLdlt<2> factor(matrix);
-  CHECK_THROWS_AS(factor.factorise(matrix), Error);
+  CHECK_THROWS_AS(factor.factorize(matrix), Error);
 }
 
 TEST_SUITE_END();

@@ -28,7 +28,7 @@ std::array<Index, 3> face_of(const Tets& tets, Index h) {
 TEST_CASE("neighboring tets name each other and share a face") {
   const tests::Solid solid = tests::solid_torus(600);
   const Index n = static_cast<Index>(solid.points.rows());
-  const IndexVec twin = mesh::tet_neighbours(solid.tets, n);
+  const IndexVec twin = mesh::tet_neighbors(solid.tets, n);
   REQUIRE(twin.size() == 4 * solid.tets.rows());
   Index alone = 0;
   for (Index h = 0; h < twin.size(); ++h) {

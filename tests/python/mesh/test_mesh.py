@@ -170,7 +170,7 @@ def test_edges_and_neighbors_against_numpy(ring):
     surface = ring.surface
     pairs = np.concatenate([surface.F[:, [i, (i + 1) % 3]] for i in range(3)])
     np.testing.assert_array_equal(surface.edges, np.unique(np.sort(pairs, axis=1), axis=0))
-    twin = _core.testing.tet_neighbours(ring.T, ring.n_vertices)
+    twin = _core.testing.tet_neighbors(ring.T, ring.n_vertices)
     half = np.flatnonzero(twin >= 0)
     np.testing.assert_array_equal(twin[twin[half]], half)
     opposite = np.sort(np.stack([np.delete(ring.T[h // 4], h % 4) for h in half]), axis=1)

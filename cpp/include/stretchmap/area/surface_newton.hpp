@@ -46,7 +46,7 @@ class SurfaceNewton {
   const GlideProblem& problem() const { return problem_; }
 
  private:
-  void factorise(const Rows& hessians, const Poll& poll);
+  void factorize(const Rows& hessians, const Poll& poll);
   double longest_step(const Points2& direction) const;
 
   GlideProblem problem_;

@@ -14,7 +14,7 @@ struct SurfaceReference {
 
 // Triangles with a larger ratio of singular values than `max_aspect`, relative to an equilateral
 // one, are given that ratio, their area and axes kept: a needle whose shape is asked to be kept
-// forbids its neighbours to change theirs. \pre max_aspect >= 1.
+// forbids its neighbors to change theirs. \pre max_aspect >= 1.
 // \throws Error "DegenerateError" for faces without area (ids: faces).
 SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces,
                                    double max_aspect);

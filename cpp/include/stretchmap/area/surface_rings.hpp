@@ -26,7 +26,7 @@ class RingSystem {
   //   [ H  J' ] [ dq ]   [ -g ]
   //   [ J  0  ] [ mu ] = [ -r ]
   // kAgain: J and H are those of the step before, and g is zero.
-  // \throws Error "SolverError" when the factorisation breaks down.
+  // \throws Error "SolverError" when the factorization breaks down.
   Points2 step(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                const Points2Ref& angles, RingStep kind, const Poll& poll = {});
 

@@ -1,5 +1,5 @@
-// Stretch energy minimisation in the flat torus: Algorithm 4.1 with what cancels left out. A step
-// freezes L_S, solves (4.5) for both unit-period coordinates with one factorisation, and goes to
+// Stretch energy minimization in the flat torus: Algorithm 4.1 with what cancels left out. A step
+// freezes L_S, solves (4.5) for both unit-period coordinates with one factorization, and goes to
 // the exact minimum of E_S on the way there, never over a face.
 #pragma once
 
@@ -32,7 +32,7 @@ class SurfaceSem {
   // that along v; turns (n, 2): where to start, faces already turned over are allowed.
   SurfaceSem(SurfaceChart chart, const VecRef& areas, double aspect, Points2 turns);
 
-  // \throws Error "SolverError" when the factorisation breaks down.
+  // \throws Error "SolverError" when the factorization breaks down.
   SemStep step();
 
   SurfaceFigures figures() const;

@@ -1,5 +1,5 @@
 // STRETCHMAP_CLONES before a function compiles it for several generations of processors; the one
-// to run is chosen when the library is loaded. Loops over lanes in it are vectorised accordingly.
+// to run is chosen when the library is loaded. Loops over lanes in it are vectorized accordingly.
 // Its file has to be compiled without contraction, so that all of them give the same bits.
 #pragma once
 

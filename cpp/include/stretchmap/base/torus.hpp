@@ -1,4 +1,4 @@
-// The standard torus, and the only place where it is parametrised.
+// The standard torus, and the only place where it is parametrized.
 #pragma once
 
 #include <cmath>

@@ -19,9 +19,9 @@ class BlockLdlt {
 
   // \pre the pattern given to the constructor.
   // \throws Error "SolverError" for a pivot that is zero or not finite.
-  void factorise(const SparseMatrix& A, const Poll& poll = {});
+  void factorize(const SparseMatrix& A, const Poll& poll = {});
 
-  // \pre factorise was called.
+  // \pre factorize was called.
   Vec solve(const VecRef& right) const;
 
  private:

@@ -1,5 +1,5 @@
 // Symmetric systems of 3x3 blocks, one block row per mesh vertex: the Newton systems of the
-// flip-free optimisation.
+// flip-free optimization.
 #pragma once
 
 #include <memory>

@@ -22,7 +22,7 @@ struct SpdOptions {
 // Owns the matrix. A new set of values is written into matrix().valuePtr() and announced by
 // refactor():
 //
-//   SpdSolver solver(A);                       // analysis and first factorisation
+//   SpdSolver solver(A);                       // analysis and first factorization
 //   solver.solve(B, X);                        // X (n, k): warm start in, solution out
 //   fill_values(solver.matrix().valuePtr());   // same pattern
 //   solver.refactor();                         // numerical work only

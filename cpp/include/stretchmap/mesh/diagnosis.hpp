@@ -31,7 +31,7 @@ struct SolidDiagnosis {
   IndexVec duplicates;      // later copies of a tet with the same four vertices
   IndexVec degenerate;      // tets without volume, see size.hpp
   IndexVec misoriented;     // tets that run against their patch, taken with positive total volume
-  IndexVec inverted;        // tets oriented like their neighbours and yet negative: folded over
+  IndexVec inverted;        // tets oriented like their neighbors and yet negative: folded over
   IndexVec conflicts;       // tets where no turning helps: the solid is not orientable
   Faces nonmanifold_faces;  // faces of more than two tets
   Edges nonmanifold_edges;  // edges with more than two boundary faces

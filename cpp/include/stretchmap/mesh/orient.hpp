@@ -26,7 +26,7 @@ Patches tet_patches(const TetsRef& tets, const FacetGroups& half_faces, const Ma
 // - a closed patch of faces encloses a positive volume, an open one goes with its majority (with
 //   its first face in a draw);
 // - a patch of tets has a positive volume in total.
-// A folded tet, consistent with its neighbours but negative, is not turned: turning it would hide
+// A folded tet, consistent with its neighbors but negative, is not turned: turning it would hide
 // the fold.
 Mask faces_to_turn(const PointsRef& points, const FacesRef& faces, const Patches& patches);
 Mask tets_to_turn(const PointsRef& points, const TetsRef& tets, const Patches& patches);

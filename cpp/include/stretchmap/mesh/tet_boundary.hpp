@@ -19,7 +19,7 @@ TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices, const Poll& poll
 
 // (4 k) the half-face on the other side of each half-face, -1 on the boundary.
 // \throws as above.
-IndexVec tet_neighbours(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
+IndexVec tet_neighbors(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 // (e, 2) edges of a tet mesh, lower id first, in lexicographic order.
 Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll = {});

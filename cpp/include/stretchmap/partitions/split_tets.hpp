@@ -15,7 +15,7 @@ struct TetSplit {
   Vec cut_weight;   // (c) at (1 - w) first + w second
 };
 
-// Cuts every tet along values = 0. Neighbours agree on the new vertices and on the diagonals of cut
+// Cuts every tet along values = 0. Neighbors agree on the new vertices and on the diagonals of cut
 // faces, so the result is conforming and either side has a closed boundary.
 // values (n). A vertex closer to the level than 1e-9 of one of its edges is taken to lie on it.
 // gate (n) or empty: only the part of the level where the gate is positive is cut; a tet that the

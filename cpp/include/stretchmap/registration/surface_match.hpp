@@ -21,7 +21,7 @@ struct MatchModel {
   SparseMatrix hessian;  // (2 n, 2 n), positive semi-definite
 };
 
-// Derivatives by y. What a step dy does to the edges of an image triangle is modelled in one of two
+// Derivatives by y. What a step dy does to the edges of an image triangle is modeled in one of two
 // ways:
 //   tangent  dX = slope dy at each corner; slopes (n, 6) are row-major 3x2 matrices;
 //   chord    dP_f = S_f dE_f with the metric S_f = P_f E_f^-1 of the whole triangle, E_f its edges

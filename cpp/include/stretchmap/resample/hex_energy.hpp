@@ -3,7 +3,7 @@
 //   Psi(x) = sum_h weight_h / 8 sum_c f(psi(J_hc)) + sum_j c_j (n_j . (sum_i w_ji x_i - y_j))^2,
 //   f(psi) = ((1 + psi)^p - 1) / p,     J_hc = [x_1 - x_0, x_2 - x_0, x_3 - x_0] diag(1 / sides),
 //
-// over the eight corners c of each hexahedron, x_1, x_2, x_3 the neighbours of x_0 and psi the
+// over the eight corners c of each hexahedron, x_1, x_2, x_3 the neighbors of x_0 and psi the
 // energy of element_energy.hpp (Garanzha et al. 2021): the rest shape is a box. The larger p, the
 // more the worst corners count: with shape alone, edges of the right lengths and p = 3/2, f is
 // 2/3 of (1 / scaled Jacobian - 1). The second sum is that of boundary_fit.hpp.
@@ -47,7 +47,7 @@ class HexEnergy {
   linalg::BlockMatrix pattern() const;
   HexReport value(const PointsRef& x, const HexWeights& w) const;
   // Gradient (n, 3) and positive semi-definite Hessian. \pre value(x, w).energy is finite.
-  void linearise(const PointsRef& x, const HexWeights& w, Points& gradient,
+  void linearize(const PointsRef& x, const HexWeights& w, Points& gradient,
                  linalg::BlockMatrix& hessian) const;
 
  private:

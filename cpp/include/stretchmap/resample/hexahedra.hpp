@@ -15,7 +15,7 @@ using Hexes = Eigen::Matrix<Index, Eigen::Dynamic, 8, Eigen::RowMajor>;
 using HexesRef = Eigen::Ref<const Hexes>;
 using Rows8 = Eigen::Matrix<double, Eigen::Dynamic, 8, Eigen::RowMajor>;
 
-// Of each corner: itself and its three neighbours, positively oriented in a right hexahedron.
+// Of each corner: itself and its three neighbors, positively oriented in a right hexahedron.
 inline constexpr std::array<std::array<int, 4>, 8> kCorners = {{{0, 1, 3, 4},
                                                                 {1, 2, 0, 5},
                                                                 {2, 3, 1, 6},

@@ -48,7 +48,7 @@ class BoundaryBarrier {
 
   // Adds to `gradient` and `hessian` the derivatives by steps of the three vertices along the first
   // two axes of their frames.
-  void linearise(const PointsRef& x, Index f, double epsilon, Eigen::Matrix<double, 6, 1>& gradient,
+  void linearize(const PointsRef& x, Index f, double epsilon, Eigen::Matrix<double, 6, 1>& gradient,
                  Eigen::Matrix<double, 6, 6>& hessian) const;
 
  private:

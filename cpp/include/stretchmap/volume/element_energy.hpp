@@ -3,7 +3,7 @@
 //   psi(J) = shape * (tr(J^T J) / (3 chi^(2/3)) - 1) + volume * ((det^2 J + 1) / (2 chi) - 1)
 //   chi    = (det J + sqrt(epsilon^2 + det^2 J)) / 2
 //
-// chi regularises the determinant so that the energy is finite and smooth on inverted elements and
+// chi regularizes the determinant so that the energy is finite and smooth on inverted elements and
 // turns into det J as epsilon goes to 0 (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov,
 // ACM TOG 40(4), 2021). At epsilon = 0 the first term measures shape only, the second is
 // (det + 1/det)/2 - 1: both are barriers against inversion and vanish at rotations.
@@ -25,11 +25,11 @@ struct EnergyWeights {
 };
 
 // chi(det) and its first two derivatives.
-struct Regularised {
+struct Regularized {
   double value, first, second;
 };
 
-inline Regularised regularised(double det, double epsilon) {
+inline Regularized regularized(double det, double epsilon) {
   if (epsilon <= 0.0) return {det, 1.0, 0.0};
   const double root = std::sqrt(epsilon * epsilon + det * det);
   // For negative det the sum of the definition cancels; this is the same number.

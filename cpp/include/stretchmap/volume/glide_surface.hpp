@@ -1,4 +1,4 @@
-// The surface that boundary vertices glide on, as the optimiser sees it: axes, how they turn, and
+// The surface that boundary vertices glide on, as the optimizer sees it: axes, how they turn, and
 // how a point moves. Nothing else in this folder knows what surface it is.
 #pragma once
 

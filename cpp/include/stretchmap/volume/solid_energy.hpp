@@ -54,7 +54,7 @@ class SolidEnergy {
 
   // Gradient (rows, 3) and, unless null, Hessian, both in vertex frames.
   // \pre value(x, w).energy is finite.
-  void linearise(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+  void linearize(const PointsRef& x, const EnergyWeights& w, Points& gradient,
                  linalg::BlockMatrix* hessian) const;
 
   // x moved by alpha * step (rows, 3); gliding vertices stay on their surface.

@@ -63,7 +63,7 @@ class SolidNewton {
   };
 
   bool renew(const PointsRef& x, const EnergyWeights& w, bool keep);
-  bool linearise(const PointsRef& x, const EnergyWeights& w);
+  bool linearize(const PointsRef& x, const EnergyWeights& w);
   bool descend(const NewtonOptions& options, const Poll& poll, Points& direction,
                NewtonReport& report);
 

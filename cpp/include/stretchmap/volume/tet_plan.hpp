@@ -31,9 +31,9 @@ struct TetPlan {
   std::vector<Index> slots;    // 6 per tet
 
   // The entries of row r before the diagonal have the slots lower_slot[lower_start[r] ...], those
-  // after it and then its prescribed neighbours successive ones from row_slot[r] on.
+  // after it and then its prescribed neighbors successive ones from row_slot[r] on.
   std::vector<Index> lower_start, lower_slot, row_slot;
-  std::vector<Index> couple_start, couple_vertex;  // prescribed neighbours, the caller's vertices
+  std::vector<Index> couple_start, couple_vertex;  // prescribed neighbors, the caller's vertices
 
   Index rows() const { return static_cast<Index>(interior.size()); }
   Index chunks() const { return static_cast<Index>(chunk_slot.size()) - 1; }

@@ -21,7 +21,7 @@ class VolumetricStretch {
   linalg::SolveReport harmonic(const PointsRef& source, Points& x,
                                const linalg::SolveOptions& options, const Poll& poll = {});
 
-  // One step of (5.5) with the regularisation c >= 0 of (5.6), warm-started from x.
+  // One step of (5.5) with the regularization c >= 0 of (5.6), warm-started from x.
   linalg::SolveReport step(Points& x, double c, const linalg::SolveOptions& options,
                            const Poll& poll = {});
 

@@ -40,7 +40,7 @@ std::vector<Index> minimum_degree(const SparseMatrix& A, Index n) {
 // pivot = unit * diagonal * unit'. Entry by entry: the unknowns of a block may be scaled badly
 // against each other, and an inverse would mix them up.
 template <int K>
-void factorise_pivot(Eigen::Matrix<double, K, K> pivot, Eigen::Matrix<double, K, K>& unit,
+void factorize_pivot(Eigen::Matrix<double, K, K> pivot, Eigen::Matrix<double, K, K>& unit,
                      Eigen::Matrix<double, K, 1>& diagonal) {
   unit.setIdentity();
   for (int j = 0; j < K; ++j) {
@@ -81,7 +81,7 @@ BlockLdlt<K>::BlockLdlt(const SparseMatrix& A)
 
 // Row by row: each row of L solves a triangular system whose pattern is read off the tree.
 template <int K>
-void BlockLdlt<K>::factorise(const SparseMatrix& A, const Poll& poll) {
+void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
   std::vector<Index> filled(start_.begin(), start_.end() - 1), mark(order_.size(), -1);
   std::vector<Index> path(order_.size()), pattern(order_.size());
   constexpr int kSize = kWorkBlock<K>, kColumn = kSize / K;
@@ -132,7 +132,7 @@ void BlockLdlt<K>::factorise(const SparseMatrix& A, const Poll& poll) {
       row_[filled[i]] = k;
       lower_[filled[i]++] = entry;
     }
-    factorise_pivot<K>(pivot, unit_[k], diagonal_[k]);
+    factorize_pivot<K>(pivot, unit_[k], diagonal_[k]);
     if (!diagonal_[k].cwiseInverse().allFinite())
       throw Error("SolverError", "a pivot is zero or not finite", {order_[k]});
   }

@@ -48,7 +48,7 @@ Aggregates aggregate(const LevelMatrix<B>& A, double threshold) {
     for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
       if (result.strong[e]) visit(A.col[e], e);
   };
-  // Full neighbourhoods that touch no other aggregate.
+  // Full neighborhoods that touch no other aggregate.
   for (Index i = 0; i < A.n; ++i) {
     bool alone = true, free = of[i] == kFree;
     each_strong(i, [&](Index j, Index) {
@@ -61,7 +61,7 @@ Aggregates aggregate(const LevelMatrix<B>& A, double threshold) {
     each_strong(i, [&](Index j, Index) { of[j] = result.count; });
     ++result.count;
   }
-  // The others join the neighbour they are coupled to most.
+  // The others join the neighbor they are coupled to most.
   const std::vector<Index> first = of;
   for (Index i = 0; i < A.n; ++i) {
     if (first[i] != kFree) continue;

@@ -9,7 +9,7 @@ namespace stretchmap::linalg {
 
 struct Aggregates {
   Index count = 0;
-  std::vector<Index> of;     // (n) aggregate of each block row, -1 for one without neighbours
+  std::vector<Index> of;     // (n) aggregate of each block row, -1 for one without neighbors
   std::vector<char> strong;  // per off-diagonal entry of the level matrix
 };
 
