@@ -7,7 +7,7 @@ import stretchmap._core.linalg
 import stretchmap._core.mesh
 import stretchmap._core.volume
 import typing
-__all__: list[str] = ['BlockSolver', 'best_scale', 'block_ldlt_solve_2', 'block_ldlt_solve_3', 'chart_stretch_energy', 'chart_stretch_laplacian', 'chart_stretch_product', 'element_energy', 'equal_area_from_angle', 'face_energy', 'form_vectors', 'glide_areas', 'glide_energy', 'linking_number', 'orient2d', 'orient3d', 'rigid_body_modes', 'surface_quality', 'surface_stretch_energy', 'surface_stretch_laplacian', 'tet_laplacian', 'tet_neighbours', 'tet_stretch_gradient', 'translations', 'weighted_laplacian']
+__all__: list[str] = ['BlockSolver', 'best_scale', 'block_ldlt_solve_2', 'block_ldlt_solve_3', 'chart_stretch_energy', 'chart_stretch_laplacian', 'chart_stretch_product', 'element_energy', 'equal_area_from_angle', 'face_energy', 'form_vectors', 'glide_areas', 'glide_energy', 'linking_number', 'orient2d', 'orient3d', 'rigid_body_modes', 'surface_quality', 'surface_stretch_energy', 'surface_stretch_laplacian', 'tet_laplacian', 'tet_neighbors', 'tet_stretch_gradient', 'translations', 'weighted_laplacian']
 class BlockSolver:
     def __init__(self, row_ptr: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], col: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], near_nullspace: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], preconditioner: str = 'multigrid') -> None:
         ...
@@ -61,7 +61,7 @@ def tet_laplacian(tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m,
     """
     L_II, -L_IB x_B and the vertex of each row, for checks.
     """
-def tet_neighbours(tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+def tet_neighbors(tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
     ...
 def tet_stretch_gradient(image: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], rest_volumes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
     ...
