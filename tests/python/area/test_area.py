@@ -383,7 +383,7 @@ def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
     candidates = np.array([[0.0, 1.5], [0.3, 2.2], [-0.45, 5.0]])
     rated = _core.area.phase_qualities(reference, bumpy.F, conformal.turns, candidates)
     for (phase, ratio), quality in zip(candidates, rated, strict=True):
-        u, shifted = 2.0 * np.pi * (conformal.turns + [0.0, phase]).T
+        u, shifted = 2.0 * np.pi * (conformal.turns + np.array([0.0, phase])).T
         v = _core.area.angle_from_equal_area(shifted, 1.0 / ratio)
         image = Torus.from_ratio(ratio, area=1.0).xi(u, v)
         exact = _core.testing.surface_quality(reference, bumpy.F, image)
