@@ -202,11 +202,7 @@ def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
         image = scale * image @ rotation + shift
     times = np.linspace(0.0, 1.0, frames)
     flips = [
-        int(
-            (
-                ~(_core.mesh.tet_volumes((1.0 - t) * solid.V + t * image, solid.T) > 0.0)
-            ).sum()
-        )
+        int((~(_core.mesh.tet_volumes((1.0 - t) * solid.V + t * image, solid.T) > 0.0)).sum())
         for t in times
     ]
     fields = result.as_cells()
