@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import math
 import time
@@ -32,7 +33,7 @@ from .sem import minimize_stretch, start_angles, unfolded_turns
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["AreaMap", "Finish", "area_map"]
+__all__ = ["AreaMap", "Finish", "area_map", "finished"]
 
 Finish = Literal["ring", "face", "none"]
 
@@ -292,6 +293,32 @@ def area_map(
         converged=converged,
         stop_reason=reason,
         seconds=seconds,
+    )
+
+
+def finished(
+    start: AreaMap, *, max_iter: int, tol: float, progress: Progress | None = None
+) -> AreaMap:
+    """An unfinished map with its folded faces turned, and up to ``max_iter`` steps on the areas."""
+    clock = time.perf_counter()
+    surface = start.mesh
+    chart = _core.area.SurfaceChart(surface.topology, start.forms)
+    reference = _core.area.SurfaceReference(surface.V, surface.F, _MAX_ASPECT)
+    newton = _core.area.SurfaceNewton(
+        _core.area.GlideProblem(chart, reference, start.ratio), start.angles
+    )
+    unfolding = unfold_faces(newton, progress)
+    records, converged, reason = finish_areas(newton, False, max_iter, tol, math.inf, progress)
+    image = start.torus.xi(newton.angles[:, 0], newton.angles[:, 1])
+    return dataclasses.replace(
+        start,
+        angles=read_only(newton.angles),
+        image=read_only(image),
+        certificate=certify(surface, image, start.torus),
+        history=start.history + tuple(unfolding + records),
+        converged=converged,
+        stop_reason=reason,
+        seconds={**start.seconds, "finish": time.perf_counter() - clock},
     )
 
 

@@ -18,6 +18,9 @@ from ..maps.history import IterationRecord
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
+_EMBEDDINGS = 6
+_LEAST_WEIGHT = 1e-12
+
 
 def minimize_stretch(
     surface: TriMesh,
@@ -59,12 +62,22 @@ def unfolded_turns(
     surface: TriMesh, chart: _core.area.SurfaceChart, conformal: ConformalMap
 ) -> NDArray[np.float64]:
     """The conformal map's turns or, if it has folds, those of a map that has none."""
-    if (_core.area.turn_areas(chart, conformal.turns) > 0.0).all():
-        return conformal.turns
-    # Positive weights embed the surface in a flat torus whatever its triangles (Tutte).
-    weights = np.ones(len(surface.edges))
+    turns, weights = conformal.turns, np.ones(len(surface.edges))
     forms = conformal.forms.astype(float)
-    return _core.forms.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
+    share = surface.face_areas / surface.face_areas.sum()
+    edge = surface.topology.edge
+    for _ in range(_EMBEDDINGS):
+        areas = _core.area.turn_areas(chart, turns)
+        if (areas > 0.0).all():
+            break
+        # Positive weights embed the surface in a flat torus whatever its triangles (Tutte); but a
+        # long limb shrinks by a factor with every turn of its girth, until its tip is lost in
+        # rounding. Weights that fall where areas fall let it shrink less.
+        turns = _core.forms.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
+        ratios = np.maximum(_core.area.turn_areas(chart, turns), 0.0) / share
+        stretch = np.bincount(edge, np.repeat(np.sqrt(ratios), 3), len(weights))
+        weights = np.maximum(stretch, _LEAST_WEIGHT)
+    return turns
 
 
 def start_angles(

@@ -30,14 +30,13 @@ from .model import Budget, History
 from .options import FillOptions, VolumeOptions
 from .problem import Outcome, VolumeProblem
 from .start import started
-from .untangle import stuck_tets, untangle_patches, untangle_whole
+from .untangle import folded_faces, stuck_tets, untangle_patches, untangle_whole
 
 __all__ = ["require_certified", "solve"]
 
 _log = logging.getLogger("stretchmap")
 
 _START_TOL = 1e-4
-_LEAST_SECONDS = 10.0  # of processor time, for a small mesh
 _ROUNDS = 12
 _RINGS = (2, 4)  # reach of the patches, to begin with and in later rounds
 # Inverted tets: with a larger share of all, it is not a matter of single places.
@@ -52,6 +51,11 @@ class _Run:
     options: FillOptions
     history: History
     seconds: dict[str, float] = field(default_factory=dict)
+
+    def take(self, problem: VolumeProblem) -> None:
+        """Go on with another problem."""
+        self.problem = problem
+        self.history.model = problem.model(self.options)
 
     @property
     def x(self) -> NDArray[np.float64]:
@@ -73,6 +77,8 @@ def solve(
     options: FillOptions,
     *,
     glide: bool = False,
+    budget: Budget | None = None,
+    patience: float = 1.0,
     progress: Progress | None = None,
 ) -> Outcome:
     """Find a map without inverted tets and with little volume distortion.
@@ -84,21 +90,27 @@ def solve(
         `VolumeOptions` if the boundary lies on a torus.
     glide : bool
         Whether the boundary may move on the torus.
+    budget : Budget, optional
+        Default: what the options allow.
+    patience : float
+        Share of it that untangling may take.
     progress : Progress, optional
     """
-    budget = Budget(max(_LEAST_SECONDS, options.time_limit * problem.solid.n_tets))
+    budget = budget or Budget.of(options, problem.solid.n_tets)
     clock = time.perf_counter()
     problem = started(problem, solver=options.solver, tol=_START_TOL)
-    run = _Run(problem, options, History(problem.model(options), budget, progress))
+    run = _Run(problem, options, History(problem.model(options), budget.share(patience), progress))
     run.seconds["start"] = time.perf_counter() - clock
     with run.timed("untangle"):
         left = _untangle(run, glide=glide)
     if left:
-        reason = "the time limit was reached; " if budget.spent else ""
+        reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")
+    run.history.budget = budget
     converged, reason, newton = _minimize(run, glide=glide)
     exact = False
-    graph = not len(stuck_tets(run.history.model, run.x, glide=glide))
+    graph = not len(run.problem.held)
+    graph = graph and not len(stuck_tets(run.history.model, run.x, glide=glide))
     if problem.torus is not None and isinstance(options, VolumeOptions) and graph:
         with run.timed("equalize"):
             x = equalize(run.history.model, run.x, run.history, options, glide=glide, newton=newton)
@@ -150,22 +162,48 @@ def _untangle(run: _Run, *, glide: bool) -> int:
             break
         if len(stuck) and run.problem.refinement is not None:
             n = run.problem.solid.n_vertices
-            run.problem = run.problem.halved(crowded_edges(run.problem.solid, stuck))
-            history.model = run.problem.model(run.options)
+            run.take(run.problem.halved(crowded_edges(run.problem.solid, stuck)))
             _log.info(
                 "%d inverted tets are stuck: %d edges round them halved",
                 len(stuck), run.problem.solid.n_vertices - n,
             )  # fmt: skip
             stuck = stuck_tets(history.model, run.x, glide=glide)
     if fewest and len(stuck):
-        run.problem = best
-        history.model = best.model(run.options)
-        return fewest
+        run.take(best)
+        inverted = len(stuck_tets(history.model, run.x, glide=False))
+        if inverted or not glide:
+            return inverted
+        _hold_folded(run)
     # Away from folding: the nearer to it, the shorter are all steps that follow.
     away = untangle_whole(history.model, run.x, history, glide=glide)
     if not away.left and not len(stuck_tets(history.model, away.x, glide=glide)):
         run.x = away.x
     return 0
+
+
+def _hold_folded(run: _Run) -> None:
+    """Let the boundary glide but for folded faces, which no step could unfold."""
+    faces = folded_faces(run.history.model, run.x)
+    held = np.unique(run.history.model.faces[faces]).astype(np.intp)
+    _log.info("%d boundary faces stay folded: their vertices are held", len(faces))
+    run.take(dataclasses.replace(run.problem, held=held))
+
+
+def _release(run: _Run) -> bool:
+    """Let go what was held, if the faces there can be unfolded by now."""
+    before = run.problem
+    run.take(dataclasses.replace(before, held=before.held[:0]))
+    model, history = run.history.model, run.history
+    run.x = untangle_whole(model, run.x, history, glide=True).x
+    stuck = stuck_tets(model, run.x, glide=True)
+    if len(stuck):
+        run.x = untangle_patches(
+            model, run.x, stuck, rings=_RINGS[1], glide=True, budget=history.budget
+        )
+    if len(stuck_tets(model, run.x, glide=True)):
+        run.take(before)
+        return False
+    return True
 
 
 def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNewton | None]:
@@ -183,6 +221,15 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
             done = minimize(
                 history.model, run.x, history, glide=True, start=first, goal=o.volume_weight
             )
+        if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
+            with run.timed("release"):
+                released = _release(run)
+            if released:
+                with run.timed("glide"):
+                    done = minimize(
+                        history.model, run.x, history, glide=True,
+                        start=goal, goal=o.volume_weight,
+                    )  # fmt: skip
         converged, reason, newton = done.converged, done.reason, done.newton
         if not _keep(run, done.x, True, "the map with a held boundary is kept"):
             return False, "gliding would fold the boundary", None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..area.map import AreaMap, Finish, area_map
+from ..area.map import AreaMap, Finish, area_map, finished
 from ..area.search import Ratio
 from ..base.arrays import read_only
 from ..base.options import callback, flag, instance, one_of, real, whole
@@ -28,6 +29,7 @@ from ..mesh.given import as_solid, require_same_mesh
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
 from .engine import require_certified, solve
+from .model import Budget
 from .options import VolumeOptions
 from .problem import Outcome, VolumeProblem
 from .vsem import run_vsem
@@ -41,6 +43,9 @@ _log = logging.getLogger("stretchmap")
 _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 # Larger runs say beforehand how much they need.
 _LARGE = 1_000_000
+# Share of the time left that untangling may take, from each start.
+_PATIENCE = (0.4, 0.5, 1.0)
+_AREA_STEPS, _AREA_TOL = 100, 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -214,30 +219,71 @@ def volume_map(
             solid.n_tets, method, solid.n_tets * _BYTES_PER_TET[method] / 2**30,
         )  # fmt: skip
     solid.require_solid_torus()
-    seconds: dict[str, float] = {}
+    budget = Budget.of(options, solid.n_tets)
+    boundary = boundary or ("glide" if method == "certified" else "frozen")
+    starts: Iterator[MapResult]
     if start is None:
-        clock = time.perf_counter()
-        start = _boundary_map(solid, method, boundary, options, progress)
-        seconds["boundary"] = time.perf_counter() - clock
-    image, torus = _start_of(solid, instance("start", start, MapResult, "a map of this solid"))
-    boundary_map = start if isinstance(start, AreaMap) else None
+        starts = _boundary_maps(solid, method, boundary, options, progress)
+    else:
+        starts = iter([instance("start", start, MapResult, "a map of this solid")])
     if method == "vsem":
-        problem = VolumeProblem.of(solid, image, torus=torus, refine=None)
-        outcome = run_vsem(problem, options, c=c or 0.0, max_iter=max_iter, progress=progress)
-        return _result(outcome, method, "frozen", boundary_map, seconds)
+        return _paper_map(solid, next(starts), options, c or 0.0, max_iter, progress)
     if max_iter is not None:
         options = dataclasses.replace(options, frozen_iter=max_iter, glide_iter=max_iter)
     if options.tol is not None:
         options = dataclasses.replace(options, frozen_tol=options.tol, glide_tol=options.tol)
-    clock = time.perf_counter()
-    problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
-    seconds["refine"] = time.perf_counter() - clock
-    boundary = boundary or "glide"
-    outcome = solve(problem, options, glide=boundary == "glide", progress=progress)
-    result = _result(outcome, method, boundary, boundary_map, seconds)
+    best = None
+    for begin, patience in zip(starts, _PATIENCE, strict=False):
+        if best is not None:
+            _log.info("not certified (%s): once more from another start", best.certificate.reason)
+        image, torus = _start_of(solid, begin)
+        problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
+        outcome = solve(
+            problem, options, glide=boundary == "glide", budget=budget,
+            patience=1.0 if start is not None else patience, progress=progress,
+        )  # fmt: skip
+        found = _result(outcome, method, boundary, begin)
+        if best is None or _better(found, best):
+            best = found
+        if best.certificate.certified or budget.spent:
+            break
+    assert best is not None
+    _warn(best)
     if not keep_best:
-        require_certified(result.certificate, "the map")
+        require_certified(best.certificate, "the map")
+    return best
+
+
+def _paper_map(
+    solid: TetMesh,
+    start: MapResult,
+    options: VolumeOptions,
+    c: float,
+    max_iter: int | None,
+    progress: Progress | None,
+) -> VolumeMap:
+    image, torus = _start_of(solid, start)
+    problem = VolumeProblem.of(solid, image, torus=torus, refine=None)
+    outcome = run_vsem(problem, options, c=c, max_iter=max_iter, progress=progress)
+    result = _result(outcome, "vsem", "frozen", start)
+    _warn(result)
     return result
+
+
+def _better(one: VolumeMap, other: VolumeMap) -> bool:
+    """Certified, or else with fewer flipped tets."""
+
+    def rank(result: VolumeMap) -> tuple[bool, int]:
+        return result.certificate.certified, -int(result.distortion.flips or 0)
+
+    return rank(one) > rank(other)
+
+
+def _warn(result: VolumeMap) -> None:
+    if not result.converged:
+        _log.warning("volume map not converged: %s", result.stop_reason)
+    if result.distortion.flips:
+        _log.warning("volume map has %d flipped tets", result.distortion.flips)
 
 
 def _check_options(
@@ -265,33 +311,39 @@ def _check_options(
         whole("max_iter", max_iter, 0)
 
 
-def _boundary_map(
+def _boundary_maps(
     solid: TetMesh,
     method: str,
-    boundary: str | None,
+    boundary: str,
     options: VolumeOptions,
     progress: Progress | None,
-) -> AreaMap:
-    # A gliding boundary loses the exact areas again; a held one is only as good as them. Its last
-    # per cent costs triangles their shape, which the interior has to pay for.
-    finish: Finish = "face" if boundary == "frozen" else "none"
-    ratio: Ratio = "search"
-    tol = 0.05
+) -> Iterator[AreaMap]:
+    """Maps of the boundary to start from, each for the case that those before lead nowhere."""
+    finish: Finish = "ring" if method == "vsem" else "none"
+    ratio: Ratio = "conformal" if method == "vsem" else "search"
+    first = area_map(
+        solid.surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish,
+        keep_best=True, progress=progress,
+    )  # fmt: skip
     if method == "vsem":
-        finish, tol, ratio = "ring", 5e-3, "conformal"
+        yield first
+        return
 
-    def mapped(finish: Finish) -> AreaMap:
-        return area_map(
-            solid.surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish,
-            tol=tol, keep_best=True, progress=progress,
-        )  # fmt: skip
+    def areas() -> AreaMap:
+        return finished(first, max_iter=_AREA_STEPS, tol=_AREA_TOL, progress=progress)
 
-    first = mapped(finish)
-    if finish != "none" or first.certificate.certified:
-        return first
-    # Folded faces are a bad start: finishing unfolds them, if anything does.
-    finished = mapped("face")
-    return finished if finished.certificate.certified else first
+    def unfolded() -> AreaMap:
+        return finished(first, max_iter=0, tol=_AREA_TOL, progress=progress)
+
+    # A gliding boundary loses the exact areas again; a held one is only as good as them. Their last
+    # per cent costs triangles their shape, which the interior has to pay for.
+    if boundary == "glide":
+        yield first
+        yield unfolded()
+        yield areas()
+    else:
+        yield areas()
+        yield unfolded()
 
 
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
@@ -311,8 +363,7 @@ def _result(
     outcome: Outcome,
     method: str,
     boundary: str,
-    boundary_map: AreaMap | None,
-    seconds: dict[str, float],
+    start: MapResult,
 ) -> VolumeMap:
     problem, refinement = outcome.problem, outcome.problem.refinement
     assert problem.torus is not None
@@ -321,8 +372,11 @@ def _result(
     image, torus = problem.x * scale, problem.torus.scaled(scale)
     clock = time.perf_counter()
     certificate = certify(problem.solid, image, torus)
-    seconds = {**seconds, **outcome.seconds, "certificate": time.perf_counter() - clock}
-    result = VolumeMap(
+    seconds = {**outcome.seconds, "certificate": time.perf_counter() - clock}
+    boundary_map = start if isinstance(start, AreaMap) else None
+    if boundary_map is not None:
+        seconds = {"boundary": sum(boundary_map.seconds.values()), **seconds}
+    return VolumeMap(
         mesh=problem.solid,
         image=read_only(image),
         torus=torus,
@@ -337,8 +391,3 @@ def _result(
         seconds=seconds,
         vertex_exact=outcome.vertex_exact,
     )
-    if not result.converged:
-        _log.warning("volume map not converged: %s", result.stop_reason)
-    if result.distortion.flips:
-        _log.warning("volume map has %d flipped tets", result.distortion.flips)
-    return result

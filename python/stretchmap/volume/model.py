@@ -19,6 +19,7 @@ from .options import FillOptions
 __all__ = ["Budget", "History", "SolidModel", "face_areas"]
 
 FREE, FIXED, GLIDING = 0, 1, 2
+_LEAST_SECONDS, _MARGIN = 4.0, 0.9  # a stage under way is ended
 _REACH = 8.0  # factor up to which the volume next to a boundary face may be off what it expects
 
 
@@ -41,6 +42,8 @@ class SolidModel:
     scale : ndarray, shape (n,), or None
         Logarithm of the length an image piece may be expected to have, relative to its source: what
         the boundary image has there, spread inside. None: 0 everywhere.
+    held : ndarray of intp
+        Boundary vertices that stay in place where the others glide.
     """
 
     V: NDArray[np.float64]
@@ -50,6 +53,7 @@ class SolidModel:
     options: FillOptions
     torus: Torus | None = None
     scale: NDArray[np.float64] | None = None
+    held: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     @cached_property
     def shares(self) -> NDArray[np.float64]:
@@ -57,6 +61,16 @@ class SolidModel:
         volumes = _core.volume.signed_tet_volumes(self.V, self.T)
         shares: NDArray[np.float64] = volumes / volumes.sum()
         return shares
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """Of the tets in the energy, summing to 1: (k,).
+
+        Between one and all and the volume: by volume alone, small tets are left with ratios of any
+        size, by number alone, large ones pay for slivers.
+        """
+        weights = np.sqrt(self.shares)
+        return np.asarray(weights / weights.sum())
 
     @cached_property
     def rings(self) -> NDArray[np.float64]:
@@ -113,7 +127,14 @@ class SolidModel:
         """Which vertices are free, fixed, or glide: (n,)."""
         motion = np.full(len(self.V), FREE, np.uint8)
         motion[self.boundary] = GLIDING if glide else FIXED
+        motion[self.held] = FIXED
         return motion
+
+    @cached_property
+    def gliding_faces(self) -> NDArray[np.intp]:
+        """Boundary faces of which at least one vertex glides where the boundary does."""
+        moving = self.motion(glide=True) == GLIDING
+        return np.flatnonzero(moving[self.faces].any(axis=1))
 
     def newton(self, x: NDArray[np.float64], *, glide: bool) -> _core.volume.SolidNewton:
         """The minimizer of the distortion of all tets, started near ``x``."""
@@ -121,9 +142,9 @@ class SolidModel:
             x,
             tets=self.T,
             rest=self.rest,
-            weights=self.shares,
+            weights=self.weights,
             motion=self.motion(glide=glide),
-            boundary=self.gliding(self.faces) if glide else None,
+            boundary=self.gliding(self.faces[self.gliding_faces]) if glide else None,
         )
 
 
@@ -146,6 +167,15 @@ class Budget:
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
         self._end = time.process_time() + seconds
+
+    @classmethod
+    def of(cls, options: FillOptions, n_tets: int) -> Budget:
+        """What the options allow for a mesh of that many tets; some seconds for a small one."""
+        return cls(max(_LEAST_SECONDS, _MARGIN * options.time_limit * n_tets))
+
+    def share(self, part: float) -> Budget:
+        """A part of what is left."""
+        return Budget(part * max(self._end - time.process_time(), 0.0))
 
     @property
     def spent(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,6 +44,7 @@ class VolumeProblem:
     torus : Torus or None
         What the boundary lies on here, if it may glide; centered at the origin.
     scale : ndarray, shape (n,), or None
+    held : ndarray of intp
         As in `SolidModel`.
     """
 
@@ -56,6 +57,7 @@ class VolumeProblem:
     warm: bool
     torus: Torus | None = None
     scale: NDArray[np.float64] | None = None
+    held: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     @classmethod
     def of(
@@ -145,6 +147,7 @@ class VolumeProblem:
             options=options,
             torus=self.torus,
             scale=self.scale,
+            held=self.held,
         )
 
 

@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from .. import _core
 from .model import FIXED, GLIDING, Budget, History, SolidModel
 
-__all__ = ["Untangled", "stuck_tets", "untangle_patches", "untangle_whole"]
+__all__ = ["Untangled", "folded_faces", "stuck_tets", "untangle_patches", "untangle_whole"]
 
 _WIDEST = 1.0  # epsilon: determinants are 1 where all is well, a larger one tells nothing apart
 _LEAST = 1e-9
@@ -166,7 +166,7 @@ def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDA
     stuck = np.zeros(len(model.T), bool)
     stuck[_core.certificate.not_positive_tets(x, model.T)] = True
     if glide and model.torus is not None:
-        folded = _core.certificate.torus_graph(x, model.faces, model.torus.R).bad
+        folded = folded_faces(model, x)
         touched = np.ones(len(model.V), bool)
         touched[model.boundary] = False
         inside = touched.copy()
@@ -174,6 +174,13 @@ def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDA
         # Of a tet without a boundary face, at least two vertices lie inside.
         stuck |= (inside[model.T].sum(axis=1) == 1) & touched[model.T].all(axis=1)
     return np.flatnonzero(stuck)
+
+
+def folded_faces(model: SolidModel, x: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Boundary faces that do not look outward everywhere, and of which a vertex may glide."""
+    assert model.torus is not None
+    folded = _core.certificate.torus_graph(x, model.faces, model.torus.R).bad
+    return np.intersect1d(folded, model.gliding_faces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +263,7 @@ def untangle_patches(
             faces = model.faces[moving[model.faces].any(axis=1)]
             if len(faces):
                 boundary = model.gliding(faces, number)
-        weights = model.shares[patch.tets]
+        weights = model.weights[patch.tets]
         start = np.ascontiguousarray(x[patch.vertices])
         newton = _core.volume.SolidNewton(
             start,
