@@ -139,7 +139,7 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
     angle[k] << angles(i, 0) + kTwoPi * problem.chart.shift_u(f, k),
         angles(i, 1) + kTwoPi * problem.chart.shift_v(f, k);
   }
-  const double size = problem.reference.areas(f);
+  const double size = problem.reference.areas(f), share = problem.reference.weights(f);
   Jet sum;
   const Jet chart = chart_jet(angle, 1.0 / problem.ratio, second);
   const Jet area = area_jet(p, second);
@@ -147,21 +147,21 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
     sum.value = std::numeric_limits<double>::infinity();
     return sum;
   }
-  add_barrier(area, scale * size, weights.area * size, curvature, second, sum);
-  if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * size, 1.0, second, sum);
+  add_barrier(area, scale * size, weights.area * share, curvature, second, sum);
+  if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * share, 1.0, second, sum);
   if (weights.facing > 0.0) {
     const Facing outward = facing(p, problem.torus(), second);
     if (weights.epsilon <= 0.0 && !(outward.least.value > 0.0)) {
       sum.value = std::numeric_limits<double>::infinity();
       return sum;
     }
-    const double weight = 0.25 * weights.facing * size;
+    const double weight = 0.25 * weights.facing * share;
     add_facing(outward.least, size, weight, weights.epsilon, second, sum);
     for (const Jet& corner : outward.corner)
       add_facing(corner, size, weight, weights.epsilon, second, sum);
   }
   if (weights.shape > 0.0)
-    add_shape(dirichlet_jet(p, problem.reference.cotan.row(f), second), area, weights.shape * size,
+    add_shape(dirichlet_jet(p, problem.reference.cotan.row(f), second), area, weights.shape * share,
               second, sum);
   return sum;
 }
@@ -231,8 +231,9 @@ Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles) {
 
 double best_scale(const GlideProblem& problem, const Points2Ref& angles) {
   const Vec areas = glide_areas(problem, angles);
-  const Vec& source = problem.reference.areas;
-  return std::sqrt(areas.sum() / (source.array().square() / areas.array()).sum());
+  const Eigen::ArrayXd ratio = areas.array() / problem.reference.areas.array();
+  const Eigen::ArrayXd weights = problem.reference.weights.array();
+  return std::sqrt((weights * ratio).sum() / (weights / ratio).sum());
 }
 
 }  // namespace stretchmap::area

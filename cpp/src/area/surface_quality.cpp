@@ -33,7 +33,7 @@ Matrix2d rounded(const Matrix2d& edges, double max_aspect) {
 
 SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces,
                                    double max_aspect) {
-  SurfaceReference reference{Vec(faces.rows()), Points(faces.rows(), 3)};
+  SurfaceReference reference{Vec(faces.rows()), Points(faces.rows(), 3), {}};
   std::vector<Index> flat;
   for (Index f = 0; f < faces.rows(); ++f) {
     const Eigen::Vector3d a = points.row(faces(f, 1)) - points.row(faces(f, 0));
@@ -52,6 +52,8 @@ SurfaceReference surface_reference(const PointsRef& points, const FacesRef& face
   }
   if (!flat.empty()) throw Error("DegenerateError", "faces of the source have no area", flat);
   reference.areas /= reference.areas.sum();
+  reference.weights = reference.areas.cwiseSqrt();
+  reference.weights /= reference.weights.sum();
   return reference;
 }
 

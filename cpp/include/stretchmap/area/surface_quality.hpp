@@ -10,6 +10,8 @@ namespace stretchmap::area {
 struct SurfaceReference {
   Vec areas;     // (m) shares of the area
   Points cotan;  // (m, 3) cotangent of the angle at each corner
+  Vec weights;   // (m) in energies, summing to one: as the roots of the areas, between one and all
+                 // (large faces pay for slivers) and the area (slivers get any ratio)
 };
 
 // Triangles with a larger ratio of singular values than `max_aspect`, relative to an equilateral
