@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError, MissingDependencyError
 from .arrays import MeshArrays
+from .gmsh import require_sound_nodes
 
 _log = logging.getLogger("stretchmap")
 
@@ -30,7 +31,12 @@ _log = logging.getLogger("stretchmap")
 _IGNORED = {"vertex", "line", "line3"}
 
 # Number of cells in the text of a file.
-_ANNOUNCED = {"vtu": rb"NumberOfCells=[\"'](\d{1,18})[\"']"}
+_ANNOUNCED = {
+    "vtk": rb"(?m)^CELL_TYPES[ \t]+(\d{1,18})\b",
+    "vtu": rb"NumberOfCells=[\"'](\d{1,18})[\"']",
+}
+# What opens the list of points.
+_ONCE = {"medit": rb"(?m)^[ \t]*Vertices\b", "gmsh": rb"(?m)^\$Nodes\b"}
 
 
 def read_meshio(path: Path, file_format: str) -> MeshArrays:
@@ -56,6 +62,8 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     """
     meshio = _import(f"reading {path.suffix} files")
     with _guarded(path):
+        if file_format == "gmsh":
+            require_sound_nodes(path)
         mesh = meshio._helpers.reader_map[file_format](str(path))
     faces, face_blocks = _cells(mesh, "triangle")
     tets, tet_blocks = _cells(mesh, "tetra")
@@ -105,11 +113,15 @@ def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
 
 
 def _require_all(path: Path, file_format: str, found: int) -> None:
-    """Raise where cells are missing: meshio passes over those of a type it does not know."""
-    pattern = _ANNOUNCED.get(file_format)
-    if pattern is None:
-        return
+    """Raise where cells are missing, since meshio passes over those of a type it does not know, or
+    where points come twice, of which it takes the last."""
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        once = _ONCE.get(file_format)
+        if once is not None and len(re.findall(once, data)) > 1:
+            raise FileFormatError("it holds two lists of points")
+        pattern = _ANNOUNCED.get(file_format)
+        if pattern is None:
+            return
         announced = sum(int(count) for count in re.findall(pattern, data))
     if announced != found:
         raise FileFormatError(f"{announced} cells are announced, {found} can be understood")
