@@ -190,14 +190,19 @@ def _off_counts(data: bytes) -> Counts:
     return (int(found[1]), int(found[2])) if found else (None, None)
 
 
+def _lines(data: bytes) -> bytes:
+    return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
 def _stl_counts(data: bytes) -> Counts:
-    if data[:5].lower() == b"solid":
-        return None, len(re.findall(rb"(?m)^[ \t]*facet\b", data))
+    text = _lines(data).lstrip().lower()
+    if text[:5] == b"solid":
+        return None, len(re.findall(rb"(?m)^[ \t]*facet\b", text))
     return None, struct.unpack("<I", data[80:84])[0] if len(data) >= 84 else None
 
 
 def _obj_counts(data: bytes) -> Counts:
-    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    data = _lines(data).replace(b"\\\n", b" ")
     found = [len(re.findall(rb"(?m)^[ \t]*" + key + rb"[ \t]", data)) for key in (b"v", b"f")]
     return found[0], found[1]
 

@@ -142,10 +142,6 @@ def fans(corners: NDArray[Any], sizes: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(corners[ids])
 
 
-def triangles_only(sizes: NDArray[Any]) -> None:
-    """Raise `FileFormatError` unless all faces have three corners."""
-    odd = np.unique(sizes[sizes != 3])
-    if len(odd):
-        raise FileFormatError(
-            f"faces with {', '.join(map(str, odd[:5].tolist()))} corners; split them into triangles"
-        )
+def lines_of(data: bytes) -> bytes:
+    """The text of a file without a byte order mark, lines ending as on this system."""
+    return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")

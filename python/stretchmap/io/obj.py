@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .arrays import MeshArrays, fans
+from .arrays import MeshArrays, fans, lines_of
 
 _log = logging.getLogger("stretchmap")
 
@@ -26,7 +26,7 @@ def read_obj(data: bytes) -> MeshArrays:
     Polygons become triangles. Texture coordinates may differ at the corners that meet in a vertex
     (a seam); where an index of theirs points nowhere all are left out, which the log says.
     """
-    data = re.sub(rb"\\\r?\n", b" ", data)
+    data = lines_of(data).replace(b"\\\n", b" ")
     points, last_point = _obj_table(data, b"v", 3)
     corners = _FACE.findall(data)
     lines = _FACE_LINE.findall(data)
@@ -34,8 +34,11 @@ def read_obj(data: bytes) -> MeshArrays:
         raise FileFormatError(f"{len(points)} vertices and {len(lines)} faces")
     table = np.array(corners) if len(corners) == len(lines) else _split_polygons(lines)
     first_face = _FACE_LINE.search(data).start()  # type: ignore[union-attr]
-    in_order = last_point <= first_face
-    faces = _obj_ids(table[:, 0::2], len(points), in_order)
+    words = table[:, 0::2]
+    if last_point > first_face and (np.char.startswith(words, b"-")).any():
+        faces = _relative_ids(data, lines, words)
+    else:
+        faces = _obj_ids(words, len(points), True)
     corner_uv = None
     if (table[:, 1::2] != b"").all():
         uv, last_uv = _obj_table(data, b"vt", 2)
@@ -75,6 +78,19 @@ def _obj_ids(words: NDArray[np.bytes_], n: int, in_order: bool) -> NDArray[np.in
             raise FileFormatError("relative indices in a file whose vertices and faces alternate")
         return np.where(ids < 0, ids + n, ids - 1)
     return ids - 1
+
+
+def _relative_ids(data: bytes, lines: list[bytes], words: NDArray[np.bytes_]) -> NDArray[np.int64]:
+    """Ids of triangles in a file whose vertices and faces alternate: -1 is the vertex before."""
+    vertices = np.array([m.start() for m in re.finditer(rb"^[ \t]*v[ \t]", data, re.MULTILINE)])
+    places = np.array([m.start() for m in _FACE_LINE.finditer(data)])
+    corners = np.array([len(line.split(b"#")[0].split()) - 1 for line in lines])
+    before = np.repeat(np.searchsorted(vertices, places), corners - 2)[:, None]
+    ids = words.astype(np.int64)
+    ids = np.where(ids < 0, ids + before, ids - 1)
+    if (ids < 0).any():
+        raise FileFormatError("a relative index points before the first vertex")
+    return ids
 
 
 def write_obj(file: BinaryIO, mesh: MeshArrays) -> None:

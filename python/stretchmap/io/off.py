@@ -8,23 +8,26 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import FileFormatError
-from .arrays import MeshArrays, fans
+from .arrays import MeshArrays, fans, lines_of
 
 
 def read_off(data: bytes) -> MeshArrays:
     """Parse an OFF file; polygons are split, normals and colors of the variants skipped."""
-    text = re.sub(rb"#.*", b"", data)
+    text = re.sub(rb"#.*", b"", lines_of(data))
     header = re.match(rb"\s*((?:ST)?C?N?)OFF\b", text)
     if not header:
         raise FileFormatError("the first word is not OFF")
-    if re.match(rb"\s*BINARY\b", text[header.end() :]):
+    rest = text[header.end() :]
+    if re.match(rb"\s*BINARY\b", rest):
         raise FileFormatError("binary OFF is not supported; save it as text")
-    lines = [line for line in text[header.end() :].decode("ascii").splitlines() if line.strip()]
+    lines = [line for line in rest.decode("ascii").split("\n") if line.strip()]
     n, m = (int(word) for word in lines[0].split()[:2])
-    if len(lines) < 1 + n + m:
-        raise FileFormatError(f"{n} points and {m} faces announced, {len(lines) - 1} lines follow")
-    if n == 0 or m == 0:
+    if n < 1 or m < 1:
         raise FileFormatError(f"{n} points and {m} faces")
+    if len(lines) != 1 + n + m:
+        if header[1]:  # what belongs to a row, only its line tells
+            raise FileFormatError(f"{n} points, {m} faces announced, {len(lines) - 1} lines follow")
+        return _words_alone(rest.split(), n, m)
     points = np.loadtxt(lines[1 : 1 + n], usecols=(0, 1, 2), ndmin=2)
     faces = lines[1 + n : 1 + n + m]
     sizes = np.loadtxt(faces, usecols=0, dtype=np.int64, ndmin=1)
@@ -35,6 +38,23 @@ def read_off(data: bytes) -> MeshArrays:
         raise FileFormatError("a face has fewer corners than it announces")
     corners = np.array([int(word) for row in rows for word in row], dtype=np.int64)
     return MeshArrays(points, F=fans(corners, sizes))
+
+
+def _words_alone(words: list[bytes], n: int, m: int) -> MeshArrays:
+    """A file whose rows are not its lines: counts, coordinates and faces, and nothing else."""
+    at = 3 + 3 * n
+    fault = FileFormatError(f"{n} points and {m} faces are announced, and something else follows")
+    sizes, corners = [], []
+    for _ in range(m):
+        if at >= len(words):
+            raise fault
+        sizes.append(int(words[at]))
+        corners += words[at + 1 : at + 1 + sizes[-1]]
+        at += 1 + max(sizes[-1], 0)
+    if at != len(words):
+        raise fault
+    points = np.array(words[3 : 3 + 3 * n]).astype(np.float64).reshape(n, 3)
+    return MeshArrays(points, F=fans(np.array(corners).astype(np.int64), np.array(sizes)))
 
 
 def write_off(file: BinaryIO, mesh: MeshArrays) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .arrays import MeshArrays, triangles_only
+from .arrays import MeshArrays, fans
+from .ply_rows import Bytes, Words
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
@@ -21,6 +22,10 @@ _NAMES = {
     "f4": "float", "f8": "double",
 }  # fmt: skip
 _ORDERS = {b"binary_little_endian": "<", b"binary_big_endian": ">", b"ascii": ""}
+
+
+# Of a list of property names, the corners of faces.
+_CORNERS = ("vertex_indices", "vertex_index")
 
 
 @dataclass(frozen=True)
@@ -37,41 +42,60 @@ class _Element:
     properties: list[_Property]
 
 
+@dataclass(frozen=True, eq=False)
+class _Lists:
+    """A list in every row: all entries one after the other, and how many each row has."""
+
+    entries: NDArray[Any]
+    sizes: NDArray[np.int64]
+
+
+_Table = dict[str, "NDArray[Any] | _Lists"]
+
+
 def read_ply(data: bytes) -> MeshArrays:
-    """Parse a PLY file of points and triangles; scalar properties become point and cell data."""
+    """Parse a PLY file of points and faces; scalar properties become point and cell data.
+
+    Polygons become triangles, each with the data of its polygon.
+    """
     order, elements, body = _header(data)
-    tables: dict[str, NDArray[Any]] = {}
-    words = None if order else body.split()
-    position = 0
+    tables: dict[str, _Table] = {}
+    source = Bytes(body, order) if order else Words(body)
+    at = 0
     for element in elements:
-        if {"vertex", "face"} <= tables.keys():
-            break
-        if words is None:
-            table, position = _binary_table(element, body, position, order)
-        else:
-            table, position = _text_table(element, words, position)
-        tables[element.name] = table
+        if element.name in tables:
+            raise FileFormatError(f"two elements are named {element.name}")
+        tables[element.name], at = _table(element, source, at)
+    if source.follows(at):
+        raise FileFormatError("more follows the last row announced")
+    rows = {element.name: element.rows for element in elements}
     for name in ("vertex", "face"):
-        if name not in tables or not len(tables[name]):
+        if not rows.get(name):
             raise FileFormatError(f"no element named {name}")
     vertex, face = tables["vertex"], tables["face"]
-    key = next(
-        (k for k in ("vertex_indices", "vertex_index") if k in (face.dtype.names or ())), None
-    )
-    if key is None:
+    corners = next((face[key] for key in _CORNERS if key in face), None)
+    if not isinstance(corners, _Lists):
         raise FileFormatError("the faces have no list vertex_indices")
-    points = np.stack([vertex[axis] for axis in "xyz"], axis=1)
-    return MeshArrays(
-        points,
-        F=face[key],
-        point_data=_scalars(vertex, {"x", "y", "z"}),
-        cell_data=_scalars(face, {key}),
-    )
+    points = np.stack([_scalar(vertex, axis) for axis in "xyz"], axis=1)
+    cell_data = _scalars(face)
+    if (corners.sizes == 3).all():
+        faces = corners.entries.reshape(-1, 3)
+    else:
+        faces = fans(corners.entries, corners.sizes)
+        cell_data = {k: np.repeat(a, corners.sizes - 2, axis=0) for k, a in cell_data.items()}
+    point_data = {k: a for k, a in _scalars(vertex).items() if k not in "xyz"}
+    return MeshArrays(points, F=faces, point_data=point_data, cell_data=cell_data)
 
 
-def _scalars(table: NDArray[Any], without: set[str]) -> dict[str, NDArray[Any]]:
-    names = [name for name in table.dtype.names or () if name not in without]
-    return {name: table[name] for name in names if table[name].ndim == 1 and name[:1] != "#"}
+def _scalar(table: _Table, name: str) -> NDArray[Any]:
+    values = table.get(name)
+    if not isinstance(values, np.ndarray):
+        raise FileFormatError(f"the vertices have no property {name}")
+    return values
+
+
+def _scalars(table: _Table) -> dict[str, NDArray[Any]]:
+    return {name: values for name, values in table.items() if isinstance(values, np.ndarray)}
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
@@ -100,70 +124,71 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
     return order, elements, body.split(b"\n", 1)[1]
 
 
-def _binary_table(
-    element: _Element, body: bytes, position: int, order: str
-) -> tuple[NDArray[Any], int]:
-    """All rows of an element; a list must be as long in every row as in the first."""
-    fields: list[tuple[Any, ...]] = []
-    lists: list[tuple[str, int]] = []
-    for prop in element.properties:
-        if prop.count_type is None:
-            fields.append((prop.name, order + prop.type))
-            continue
-        start = position + np.dtype(fields).itemsize if fields else position
-        size = (
-            int(np.frombuffer(body, order + prop.count_type, 1, offset=start)[0])
-            if element.rows
-            else 3
-        )
-        if size * np.dtype(prop.type).itemsize > len(body):
-            raise FileFormatError(f"a list of {size} entries does not fit into the file")
-        lists.append((prop.name, size))
-        fields.append((f"#{prop.name}", order + prop.count_type))
-        fields.append((prop.name, order + prop.type, (size,)))
-    dtype = np.dtype(fields)
-    table = np.frombuffer(body, dtype, element.rows, offset=position)
-    _check_lists(element, table, lists)
-    return table, position + element.rows * dtype.itemsize
+def _table(element: _Element, source: Words | Bytes, at: int) -> tuple[_Table, int]:
+    """All rows of an element, and where they end."""
+    if not element.rows:
+        return {}, at
+    found = _even_table(element, source, at)
+    return _uneven_table(element, source, at) if found is None else found
 
 
-def _text_table(element: _Element, words: list[bytes], position: int) -> tuple[NDArray[Any], int]:
-    fields: list[tuple[Any, ...]] = []
-    columns: list[tuple[str, int, int]] = []
-    lists: list[tuple[str, int]] = []
+def _even_table(element: _Element, source: Words | Bytes, at: int) -> tuple[_Table, int] | None:
+    """The rows at once where every list is as long as in the first row, else None."""
+    columns: list[tuple[_Property, int, int]] = []  # where the entries begin, and how many
     width = 0
     for prop in element.properties:
+        size = 1
+        if prop.count_type is not None:
+            size = source.count(prop.count_type, at + width)
+            width += source.size(prop.count_type)
+        if size < 0:
+            raise FileFormatError(f"a list of {size} entries in {element.name}.{prop.name}")
+        columns.append((prop, width, size))
+        width += size * source.size(prop.type)
+    end = at + element.rows * width
+    if end > len(source):
+        return None
+    block = source.block(element.rows, at, width)
+    table: _Table = {}
+    for prop, start, size in columns:
+        each = source.size(prop.type)
+        units = block[:, start : start + size * each].reshape(-1, each)
+        entries = source.numbers(units, prop.type)
         if prop.count_type is None:
-            fields.append((prop.name, prop.type))
-            columns.append((prop.name, width, 0))
-            width += 1
+            table[prop.name] = entries
             continue
-        size = int(words[position + width]) if element.rows else 3
-        lists.append((prop.name, size))
-        fields += [(f"#{prop.name}", prop.count_type), (prop.name, prop.type, (size,))]
-        columns += [(f"#{prop.name}", width, 0), (prop.name, width + 1, size)]
-        width += 1 + size
-    end = position + element.rows * width
-    if end > len(words):
-        raise FileFormatError(f"the file ends within the rows of {element.name}")
-    values = np.array(words[position:end], dtype=np.bytes_).reshape(element.rows, width)
-    table = np.empty(element.rows, np.dtype(fields))
-    for name, start, size in columns:
-        part = values[:, start : start + size] if size else values[:, start]
-        table[name] = part.astype(table.dtype[name].base)
-    _check_lists(element, table, lists)
+        counts = block[:, start - source.size(prop.count_type) : start]
+        sizes = source.numbers(counts, prop.count_type).astype(np.int64)
+        if (sizes != size).any():
+            return None
+        table[prop.name] = _Lists(entries, sizes)
     return table, end
 
 
-def _check_lists(element: _Element, table: NDArray[Any], lists: list[tuple[str, int]]) -> None:
-    for name, size in lists:
-        sizes = table[f"#{name}"]
-        if element.name == "face" and name in ("vertex_indices", "vertex_index"):
-            # Once a row has another length, all that follows is out of step.
-            wrong = np.flatnonzero(sizes != 3)
-            triangles_only(sizes[wrong[:1]])
-        elif (sizes != size).any():
-            raise FileFormatError(f"lists of several lengths in {element.name}.{name}")
+def _uneven_table(element: _Element, source: Words | Bytes, at: int) -> tuple[_Table, int]:
+    """The rows one by one, since where one begins the one before it says."""
+    starts: list[list[int]] = [[] for _ in element.properties]
+    sizes: list[list[int]] = [[] for _ in element.properties]
+    for _ in range(element.rows):
+        for prop, start, size in zip(element.properties, starts, sizes, strict=True):
+            count = 1
+            if prop.count_type is not None:
+                count = source.count(prop.count_type, at)
+                at += source.size(prop.count_type)
+            start.append(at)
+            size.append(count)
+            at += count * source.size(prop.type)
+        if at > len(source) or min(size[-1] for size in sizes) < 0:
+            raise FileFormatError(f"the file ends within the rows of {element.name}")
+    table: _Table = {}
+    for prop, start, size in zip(element.properties, starts, sizes, strict=True):
+        counts = np.array(size, np.int64)
+        row = np.repeat(np.arange(element.rows), counts)
+        within = np.arange(len(row)) - (np.cumsum(counts) - counts)[row]
+        places = np.array(start, np.int64)[row] + within * source.size(prop.type)
+        entries = source.numbers(source.gathered(prop.type, places), prop.type)
+        table[prop.name] = entries if prop.count_type is None else _Lists(entries, counts)
+    return table, at
 
 
 def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:

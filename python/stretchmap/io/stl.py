@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .arrays import MeshArrays
+from .arrays import MeshArrays, lines_of
 
 # Of a facet: nothing for the line that opens it, the rest of the line for each corner.
 _LINE = re.compile(rb"^[ \t]*(?:facet\b|vertex[ \t]+(\S.*)$)", re.MULTILINE | re.IGNORECASE)
@@ -19,12 +19,14 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 def read_stl(data: bytes) -> MeshArrays:
     """Parse an STL file, text or binary; corners with equal coordinates become one vertex."""
     count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else -1
-    if len(data) == 84 + count * _FACET.itemsize:
-        corners = np.frombuffer(data, _FACET, count, offset=84)["corners"].reshape(-1, 3)
-    elif data.lstrip()[:5].lower() == b"solid":
-        if b"endsolid" not in data:
+    behind = len(data) - 84 - count * _FACET.itemsize
+    text = lines_of(data).lstrip() if behind else b""
+    if text[:5].lower() == b"solid":
+        if b"endsolid" not in text.lower():
             raise FileFormatError("endsolid is missing, the file is cut off")
-        corners = _text_corners(data)
+        corners = _text_corners(text)
+    elif count > 0 and 0 <= behind < _FACET.itemsize:  # some programs pad their files
+        corners = np.frombuffer(data, _FACET, count, offset=84)["corners"].reshape(-1, 3)
     else:
         raise FileFormatError(
             f"{len(data)} bytes, but the header announces {max(count, 0)} triangles"
