@@ -95,7 +95,7 @@ class Bytes:
 
     def gathered(self, kind: str, places: NDArray[np.int64]) -> NDArray[Any]:
         """(n, size) units of the numbers at some places."""
-        return self._bytes[places[:, None] + np.arange(self.size(kind))]
+        return np.asarray(self._bytes[places[:, None] + np.arange(self.size(kind))])
 
     def numbers(self, units: NDArray[Any], kind: str) -> NDArray[Any]:
         """Units (n, size) as numbers of a type, in this machine's order."""
