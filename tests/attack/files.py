@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import watch
-from formats import FORMATS, misread, sound
+from formats import FORMATS, SLOW, misread, sound
 from mutation import mutant
 
-LIMIT = 10.0  # seconds for one file
+LIMIT = 20.0  # seconds for one file
 
 
 class _Notices(logging.Handler):
@@ -68,7 +68,8 @@ def serve() -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=200, help="damaged files per format")
+    about = "damaged files per format; of those VTK reads a fiftieth"
+    parser.add_argument("--count", type=int, default=200, help=about)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="part of the name of a format")
     parser.add_argument("--keep", type=Path, help="folder for the files that do not go well")
@@ -79,7 +80,10 @@ def main() -> int:
         return 0
     names = [name for name in FORMATS if options.only in name]
     first = options.seed * 1_000_000
-    jobs = [[n, k] for n in names for k in ("sound", *range(first, first + options.count))]
+    jobs: list[list[str | int]] = []
+    for name in names:
+        count = options.count // 50 if name in SLOW else options.count
+        jobs += [[name, k] for k in ("sound", *range(first, first + count))]
     tally = watch.run(Path(__file__), jobs, LIMIT)
     if options.keep:
         options.keep.mkdir(parents=True, exist_ok=True)

@@ -82,6 +82,14 @@ def _by_meshio(name: str, **options: Any) -> Callable[[Path], None]:
     return make
 
 
+def _by_pyvista(path: Path) -> None:
+    _surface().to_pyvista().save(path)
+
+
+def _by_trimesh(path: Path) -> None:
+    _surface().to_trimesh().export(path)
+
+
 def _text(make_text: Callable[[], str]) -> Callable[[Path], None]:
     return lambda path: path.write_text(make_text()) and None
 
@@ -209,9 +217,10 @@ def _obj_counts(data: bytes) -> Counts:
 
 def _npz_counts(data: bytes) -> Counts:
     """Rows by the length of the arrays, where their header is that of the sound file."""
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
     sizes = []
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        names = ("V.npy", "F.npy", "T.npy")
+        members = {name: archive.read(name) for name in archive.namelist() if name in names}
     for name, kind, bytes_per_row in (("V", b"<f8", 24), ("F", b"<i4", 12), ("T", b"<i4", 16)):
         member = members.get(f"{name}.npy", b"")
         if kind in member[:40] and len(member) > 10:
@@ -247,12 +256,19 @@ FORMATS: dict[str, Format] = {
     "vtu text": Format(".vtu", _by_meshio("vtu", binary=False), _read_mesh, _vtu_counts),
     "mesh": Format(".mesh", _written(solid=True), _read_mesh, _mesh_counts),
     "xdmf": Format(".xdmf", _written(solid=True, data=True), _read_mesh),
+    "vtp": Format(".vtp", _by_pyvista, _read_mesh),
+    "vtk of a surface": Format(".vtk", _by_pyvista, _read_mesh),
+    "glb": Format(".glb", _by_trimesh, _read_mesh),
     "map": Format(".npz", _map, _read_map, _npz_counts),
     "map of a solid": Format(".npz", _map_of_solid, _read_map, _npz_counts),
     "mask": Format(".npy", _mask, _read_mask),
     "mask archive": Format(".npz", _mask, _read_mask),
     "numbers": Format(".csv", _numbers, _read_numbers),
 }
+
+
+# Each of their files takes a process that loads VTK.
+SLOW = ("vtp", "vtk of a surface")
 
 
 def sound(name: str) -> bytes:

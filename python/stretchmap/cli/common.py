@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("stretchmap")
 
-_MESH = "Mesh: .npz (V with F or T) .obj .off .ply .stl .msh .vtu .vtk .mesh .xdmf"
+_MESH = "Mesh: .npz (V with F or T) .obj .off .ply .stl .msh .vtu .vtk .mesh .xdmf .vtp .glb .3mf"
 
 Input = Annotated[Path, typer.Argument(metavar="INPUT", help=_MESH, show_default=False)]
 MapFile = Annotated[

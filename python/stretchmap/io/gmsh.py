@@ -1,70 +1,233 @@
-"""A look at the nodes of Gmsh's ``.msh`` files of version 4.1 before meshio reads them.
+"""Reader of Gmsh's ``.msh`` files of version 4.1, text and binary.
 
-meshio makes room for as many nodes as the header announces, whether they follow or not, and a table
-as long as the largest tag.
+meshio's makes room for whatever a header announces, takes tables as long as the largest tag, and
+fails where some entities belong to physical groups and others do not.
 """
 
 from __future__ import annotations
 
 import re
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
+from .arrays import MeshArrays
+from .cells import Block, simplices
 
-__all__ = ["require_sound_nodes"]
+__all__ = ["is_gmsh_41", "read_gmsh_41"]
 
-_FORMAT = re.compile(rb"\$MeshFormat\s+4\.1\s+([01])\s+8\s")
-_ROOM = 1 << 26  # bytes a table of tags may take however small the file is
+_FORMAT = re.compile(rb"\s*\$MeshFormat\s+4\.1\s+([01])\s+8\s*\n")
+_SECTION = re.compile(rb"^\$(\w+)[ \t]*\r?\n", re.MULTILINE)
+# Number of an element type: its name and its nodes.
+_TYPES = {
+    1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8),
+    6: ("wedge", 6), 7: ("pyramid", 5), 8: ("line3", 3), 9: ("triangle6", 6), 10: ("quad9", 9),
+    11: ("tetra10", 10), 15: ("vertex", 1), 16: ("quad8", 8), 21: ("triangle10", 10),
+    23: ("triangle15", 15), 26: ("line4", 4), 27: ("line5", 5), 29: ("tetra20", 20),
+    30: ("tetra35", 35),
+}  # fmt: skip
 
 
-def require_sound_nodes(path: Path) -> None:
-    """Refuse a file whose nodes are not those announced, or whose tags are far too large.
+def is_gmsh_41(data: bytes) -> bool:
+    """Whether it is such a file; the others are meshio's."""
+    return _FORMAT.match(data) is not None
+
+
+def read_gmsh_41(data: bytes) -> MeshArrays:
+    """Parse a file: points, triangles or tets, their groups, and data by node and by element.
+
+    Cell data ``gmsh:physical`` is the first physical group of each element's entity, 0 where it has
+    none, and ``gmsh:geometrical`` the entity.
 
     Raises
     ------
     FileFormatError
-        It is such a file; those of other versions pass.
+        Other nodes than announced, tags that occur twice or nowhere, cells of other kinds.
     Exception
         What NumPy raises where the file ends too early.
     """
-    data = path.read_bytes()
-    header, section = _FORMAT.search(data), re.search(rb"^\$Nodes[ \t]*\r?\n", data, re.MULTILINE)
-    if header is None or section is None:
-        return
-    start = section.end()
-    found = _binary_tags(data, start) if header[1] == b"1" else _text_tags(data, start)
-    announced, tags = found
-    if len(tags) != announced:
-        raise FileFormatError(f"{announced} nodes are announced, {len(tags)} follow")
-    if len(tags) and (tags.min() < 1 or 8 * int(tags.max()) > 16 * len(data) + _ROOM):
-        raise FileFormatError(
-            f"tags of {len(tags)} nodes run from {tags.min()} to {tags.max()}; renumber them"
-        )
+    header = _FORMAT.match(data)
+    if header is None:
+        raise FileFormatError("it is no .msh file of version 4.1")
+    take: type[_Text] | type[_Binary] = _Binary if header[1] == b"1" else _Text
+    if take is _Binary and data[header.end() : header.end() + 4] != b"\1\0\0\0":
+        raise FileFormatError("its bytes are in the order of another kind of machine")
+    found = _Found()
+    at = _after(data, b"$EndMeshFormat", header.end())
+    while section := _SECTION.search(data, at):
+        name = section[1].decode()
+        mark, at = b"$End" + section[1], section.end()
+        if name in _READERS:
+            source = take(data, at, mark)
+            _READERS[name](found, source)
+            at = source.end
+        elif name in ("NodeData", "ElementData"):
+            label, width, rows, at = _data_header(data, at)
+            source = take(data, at, mark)
+            ids, values = source.rows(rows, width)
+            at = source.end
+            (found.node_data if name == "NodeData" else found.element_data)[label] = ids, values
+        at = _after(data, mark, at)
+    return found.mesh()
 
 
-def _binary_tags(data: bytes, at: int) -> tuple[int, NDArray[Any]]:
-    n_blocks, announced = np.frombuffer(data, np.uint64, 2, at).tolist()
-    at += 32
-    tags = []
+def _after(data: bytes, mark: bytes, at: int) -> int:
+    end = data.find(mark, at)
+    if end < 0:
+        raise FileFormatError(f"{mark.decode()} is missing")
+    return end + len(mark)
+
+
+def _data_header(data: bytes, at: int) -> tuple[str, int, int, int]:
+    """Name, columns and rows of data, which are text in every file, and where the rows begin."""
+    tags: list[list[str]] = []
+    for _ in range(3):  # words, real numbers, whole numbers
+        lines = []
+        end = data.find(b"\n", at) + 1
+        for _ in range(int(data[at:end])):
+            at, end = end, data.find(b"\n", end) + 1
+            lines.append(data[at:end].decode().strip().strip('"'))
+            if not end:
+                raise FileFormatError("the file ends within data")
+        tags.append(lines)
+        at = end
+    names, _, (_, width, rows, *_) = tags
+    return names[0], int(width), int(rows), at
+
+
+class _Text:
+    """Numbers of a section one after the other."""
+
+    def __init__(self, data: bytes, at: int, mark: bytes) -> None:
+        self.end = max(data.find(mark, at), at)
+        self._words, self._at = data[at : self.end].split(), 0
+
+    def take(self, kind: str, count: int) -> NDArray[Any]:
+        words = self._words[self._at : self._at + count]
+        if count < 0 or len(words) != count:
+            raise FileFormatError("the file ends within a section")
+        self._at += count
+        return np.array(words, np.bytes_).astype(kind) if count else np.empty(0, kind)
+
+    def rows(self, count: int, width: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Rows of a tag and numbers."""
+        table = self.take("<f8", count * (1 + width)).reshape(count, 1 + width)
+        return table[:, 0].astype(np.int64), table[:, 1:]
+
+
+class _Binary:
+    """Numbers of a section one after the other."""
+
+    def __init__(self, data: bytes, at: int, mark: bytes) -> None:
+        self._data, self.end = data, at
+
+    def take(self, kind: Any, count: int) -> NDArray[Any]:
+        size = np.dtype(kind).itemsize * count
+        if size < 0 or self.end + size > len(self._data):
+            raise FileFormatError("the file ends within a section")
+        self.end += size
+        return np.frombuffer(self._data, kind, count, self.end - size)
+
+    def rows(self, count: int, width: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Rows of a tag and numbers."""
+        table = self.take(np.dtype([("tag", "<i4"), ("values", "<f8", (width,))]), count)
+        return table["tag"].astype(np.int64), table["values"]
+
+
+_Source = _Text | _Binary
+_Rows = tuple[NDArray[Any], NDArray[Any]]
+
+
+@dataclass
+class _Found:
+    physical: dict[tuple[int, int], int] = field(default_factory=dict)
+    tags: NDArray[Any] | None = None
+    points: NDArray[Any] | None = None
+    blocks: list[Block] = field(default_factory=list)
+    element_tags: list[NDArray[Any]] = field(default_factory=list)
+    node_data: dict[str, _Rows] = field(default_factory=dict)
+    element_data: dict[str, _Rows] = field(default_factory=dict)
+
+    def mesh(self) -> MeshArrays:
+        """What was found, elements by rows of points."""
+        if self.points is None or self.tags is None:
+            raise FileFormatError("it has no nodes")
+        order = np.argsort(self.tags, kind="stable")
+        tags = self.tags[order]
+        if len(tags) and (np.diff(tags) == 0).any():
+            raise FileFormatError("two nodes have one tag")
+        blocks = []
+        for block, elements in zip(self.blocks, self.element_tags, strict=True):
+            place = np.minimum(np.searchsorted(tags, block.cells), len(tags) - 1)
+            if (tags[place] != block.cells).any():
+                raise FileFormatError("an element names a node that is not there")
+            data = {k: _by_tag(elements, rows) for k, rows in self.element_data.items()}
+            blocks.append(Block(block.kind, order[place], {**block.data, **data}))
+        data = {name: _by_tag(self.tags, rows) for name, rows in self.node_data.items()}
+        return simplices(self.points, blocks, data)
+
+
+def _by_tag(tags: NDArray[Any], rows: _Rows) -> NDArray[np.float64]:
+    """Values in the order of some tags, NaN where there are none."""
+    ids, values = rows
+    out = np.full((len(tags), values.shape[1]), np.nan)
+    if len(ids):
+        order = np.argsort(ids, kind="stable")
+        place = order[np.minimum(np.searchsorted(ids[order], tags), len(ids) - 1)]
+        known = ids[place] == tags
+        out[known] = values[place[known]]
+    return out[:, 0] if out.shape[1] == 1 else out
+
+
+def _entities(found: _Found, source: _Source) -> None:
+    for dim, count in enumerate(source.take("<i8", 4).tolist()):
+        for _ in range(count):
+            tag = int(source.take("<i4", 1)[0])
+            source.take("<f8", 6 if dim else 3)  # a box, a point
+            groups = source.take("<i4", int(source.take("<i8", 1)[0]))
+            if dim:
+                source.take("<i4", int(source.take("<i8", 1)[0]))  # what bounds it
+            found.physical[dim, tag] = int(groups[0]) if len(groups) else 0
+
+
+def _nodes(found: _Found, source: _Source) -> None:
+    if found.tags is not None:
+        raise FileFormatError("it holds two lists of nodes")
+    n_blocks, announced, _, _ = source.take("<i8", 4).tolist()
+    tags, points = [np.empty(0, np.int64)], [np.empty((0, 3))]
     for _ in range(n_blocks):  # ends where the file does
-        count = int(np.frombuffer(data, np.uint64, 1, at + 12)[0])
-        if 32 * count > len(data):
-            raise FileFormatError(f"a block of {count} nodes does not fit into the file")
-        tags.append(np.frombuffer(data, np.uint64, count, at + 20))
-        at += 20 + 32 * count
-    return announced, np.concatenate(tags) if tags else np.empty(0, np.uint64)
+        dim, _, parametric = source.take("<i4", 3).tolist()
+        count = int(source.take("<i8", 1)[0])
+        tags.append(source.take("<i8", count))
+        width = 3 + (dim if parametric else 0)
+        points.append(source.take("<f8", count * width).reshape(count, width)[:, :3])
+    found.tags, found.points = np.concatenate(tags), np.concatenate(points)
+    if len(found.tags) != announced:
+        raise FileFormatError(f"{announced} nodes are announced, {len(found.tags)} follow")
 
 
-def _text_tags(data: bytes, at: int) -> tuple[int, NDArray[Any]]:
-    words = data[at : data.find(b"$EndNodes", at)].split()
-    n_blocks, announced = int(words[0]), int(words[1])
-    at, tags = 4, []
+def _elements(found: _Found, source: _Source) -> None:
+    n_blocks, announced, _, _ = source.take("<i8", 4).tolist()
+    total = 0
     for _ in range(n_blocks):
-        count = int(words[at + 3])
-        tags.append(np.array(words[at + 4 : at + 4 + count], dtype=np.bytes_).astype(np.int64))
-        at += 4 + 4 * count
-    return announced, np.concatenate(tags) if tags else np.empty(0, np.int64)
+        dim, entity, kind = source.take("<i4", 3).tolist()
+        count = int(source.take("<i8", 1)[0])
+        if kind not in _TYPES:
+            raise FileFormatError(f"elements of type {kind} are not known")
+        name, width = _TYPES[kind]
+        rows = source.take("<i8", count * (1 + width)).reshape(count, 1 + width)
+        data = {
+            "gmsh:physical": np.full(count, found.physical.get((dim, entity), 0)),
+            "gmsh:geometrical": np.full(count, entity),
+        }
+        found.blocks.append(Block(name, rows[:, 1:], data))
+        found.element_tags.append(rows[:, 0])
+        total += count
+    if total != announced:
+        raise FileFormatError(f"{announced} elements are announced, {total} follow")
+
+
+_READERS = {"Entities": _entities, "Nodes": _nodes, "Elements": _elements}

@@ -23,12 +23,9 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError, MissingDependencyError
 from .arrays import MeshArrays
-from .gmsh import require_sound_nodes
+from .cells import Block, simplices
 
 _log = logging.getLogger("stretchmap")
-
-# Cells below the surface (points and curves that mesh generators add) carry nothing we need.
-_IGNORED = {"vertex", "line", "line3"}
 
 # Number of cells in the text of a file.
 _ANNOUNCED = {
@@ -62,39 +59,14 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     """
     meshio = _import(f"reading {path.suffix} files")
     with _guarded(path):
-        if file_format == "gmsh":
-            require_sound_nodes(path)
         mesh = meshio._helpers.reader_map[file_format](str(path))
-    faces, face_blocks = _cells(mesh, "triangle")
-    tets, tet_blocks = _cells(mesh, "tetra")
-    other = {block.type: 0 for block in mesh.cells}
-    for block in mesh.cells:
-        other[block.type] += len(block.data)
-    found = [f"{count} {kind}" for kind, count in other.items() if count]
-    _require_all(path, file_format, sum(other.values()))
-    odd = set(other) - {"triangle", "tetra"} - _IGNORED
-    if any(other[kind] for kind in odd):
-        raise FileFormatError(
-            f"the cells are {', '.join(found)}; only triangles and tets of first order can be "
-            "used, split or convert the others"
-        )
-    if tets is None and faces is None:
-        raise FileFormatError(f"no triangles and no tets ({', '.join(found) or 'no cells'})")
-    used = ("triangle",) if tets is None else ("tetra",)
-    left_out = [f"{count} {kind}" for kind, count in other.items() if count and kind not in used]
-    if left_out:
-        _log.info("%s: cells left out: %s", path, ", ".join(left_out))
-    blocks = face_blocks if tets is None else tet_blocks
-    return MeshArrays(
-        mesh.points,
-        F=faces,
-        T=tets,
-        point_data={k: np.asarray(a) for k, a in mesh.point_data.items()},
-        cell_data={
-            k: np.concatenate([np.asarray(parts[b]) for b in blocks])
-            for k, parts in mesh.cell_data.items()
-        },
-    )
+    _require_all(path, file_format, sum(len(block.data) for block in mesh.cells))
+    blocks = []
+    for b, block in enumerate(mesh.cells):
+        data = {name: np.asarray(parts[b]) for name, parts in mesh.cell_data.items()}
+        blocks.append(Block(block.type, np.asarray(block.data), data))
+    point_data = {name: np.asarray(array) for name, array in mesh.point_data.items()}
+    return simplices(np.asarray(mesh.points), blocks, point_data)
 
 
 def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
@@ -129,14 +101,6 @@ def _require_all(path: Path, file_format: str, found: int) -> None:
 
 def _plain(array: NDArray[Any]) -> NDArray[Any]:
     return array.astype(np.uint8) if array.dtype.kind == "b" else array
-
-
-def _cells(mesh: Any, kind: str) -> tuple[NDArray[Any] | None, list[int]]:
-    """All cells of one kind, and the blocks they come from."""
-    blocks = [b for b, block in enumerate(mesh.cells) if block.type == kind and len(block.data)]
-    if not blocks:
-        return None, []
-    return np.concatenate([np.asarray(mesh.cells[b].data) for b in blocks]), blocks
 
 
 def _import(task: str) -> Any:

@@ -68,7 +68,10 @@ def _obj_table(data: bytes, key: bytes, width: int) -> tuple[NDArray[np.float64]
         return np.empty((0, width)), 0
     last = max(data.rfind(b"\n" + key + b" "), data.rfind(b"\n" + key + b"\t"))
     text = [line.decode("ascii") for line in lines]
-    return np.loadtxt(text, usecols=range(width), ndmin=2), last
+    table = np.loadtxt(text, usecols=range(width), ndmin=2)
+    if len(table) != len(lines):
+        raise FileFormatError(f"a line '{key.decode()}' without numbers")
+    return table, last
 
 
 def _obj_ids(words: NDArray[np.bytes_], n: int, in_order: bool) -> NDArray[np.int64]:

@@ -10,6 +10,8 @@ format                        holds      remarks
 ``.stl``                      surfaces   single precision; equal corners become one vertex
 ``.vtu .vtk .xdmf .msh``      both       point and cell arrays; through meshio
 ``.mesh``                     both       no arrays; through meshio
+``.vtp``                      surfaces   read only; through PyVista, as ``.vtk`` of surfaces
+``.glb .gltf .3mf``           surfaces   read only; through trimesh, parts joined and welded
 ============================  =========  ======================================================
 
 What is written goes to a temporary file beside the target first and is renamed at the end, so a
@@ -33,6 +35,8 @@ from ..errors import FileFormatError
 from ..mesh.given import as_mesh, as_solid, as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from .arrays import MeshArrays, checked, checked_uv
+from .foreign import is_for_vtk_alone, read_pyvista, read_trimesh
+from .gmsh import is_gmsh_41, read_gmsh_41
 from .meshio import read_meshio, write_meshio
 from .npz import read_npz, write_npz
 from .obj import read_obj, write_obj
@@ -58,6 +62,7 @@ _WRITERS: dict[str, Callable[[BinaryIO, MeshArrays], None]] = {
 }
 # Suffix -> meshio's name of the format.
 _MESHIO = {".msh": "gmsh", ".vtu": "vtu", ".vtk": "vtk", ".mesh": "medit", ".xdmf": "xdmf"}
+_TRIMESH = (".glb", ".gltf", ".3mf")
 _WITHOUT_DATA = {".obj", ".off", ".stl", ".mesh"}
 
 
@@ -89,12 +94,13 @@ def read(
     Parameters
     ----------
     path : path-like
-        ``.npz .obj .off .ply .stl .msh .vtu .vtk .mesh .xdmf``.
+        ``.npz .obj .off .ply .stl .msh .vtu .vtk .mesh .xdmf .vtp .glb .gltf .3mf``.
     orient : bool
         Repair the orientation, as the constructors of `TriMesh` and `TetMesh` do.
     compact : bool
         Drop points that no element uses (mesh generators like to leave some). Without it row i of
-        ``V`` is point i of the file.
+        ``V`` is point i of the file, but for elements of higher order, which are taken by their
+        corners, and for formats that hold no shared vertices (``.stl .glb .gltf .3mf``).
 
     Returns
     -------
@@ -104,10 +110,10 @@ def read(
     Raises
     ------
     FileFormatError
-        Unknown suffix; an empty, truncated or unintelligible file; other cells than triangles and
-        tets.
+        Unknown suffix; an empty, truncated or unintelligible file; other cells than triangles,
+        polygons and tets.
     MissingDependencyError
-        The format needs meshio and it is not installed.
+        The format needs meshio, PyVista or trimesh, and it is not installed.
     MeshError
         The arrays in the file are not a mesh (index out of range, NaN, ...).
     OSError
@@ -231,7 +237,7 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
     (594,)
     """
     path = as_path(path)
-    suffix = _known_suffix(path, {".npz", *_READERS, *_MESHIO})
+    suffix = _known_suffix(path, {".npz", *_READERS, *_MESHIO, *_TRIMESH, ".vtp"})
     with open_to_read(path) as file:
         if not file.read(1):
             raise FileFormatError(f"{path} is empty")
@@ -241,7 +247,14 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
                 return _READERS[suffix](file.read())
             if suffix == ".npz":
                 return read_npz(file)
+            if suffix == ".msh" and is_gmsh_41(file.read(200)):
+                file.seek(0)
+                return read_gmsh_41(file.read())
     with parsing(path):
+        if suffix in _TRIMESH:
+            return read_trimesh(path)
+        if suffix == ".vtp" or (suffix == ".vtk" and is_for_vtk_alone(path)):
+            return read_pyvista(path)
         return read_meshio(path, _MESHIO[suffix])
 
 

@@ -1,0 +1,120 @@
+"""Formats that other optional packages read: ``.glb``, ``.gltf``, ``.3mf`` by trimesh, VTK's own by
+PyVista."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError, MissingDependencyError
+from .arrays import MeshArrays
+from .cells import Block, simplices
+from .npz import read_archive
+
+__all__ = ["is_for_vtk_alone", "read_pyvista", "read_trimesh"]
+
+# VTK's numbers of cell types; what is missing is named by its number.
+_VTK = {
+    1: "vertex", 2: "vertex", 3: "line", 4: "line", 5: "triangle", 7: "polygon", 9: "quad",
+    10: "tetra", 12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6",
+    24: "tetra10", 69: "triangle", 71: "tetra",
+}  # fmt: skip
+_NOT_FOR_MESHIO = re.compile(
+    rb"^DATASET[ \t]+POLYDATA\b|^[^\s#].{0,200}[ \t](?:unsigned_)?long[ \t]*\r?$", re.MULTILINE
+)
+# VTK's readers abort and write past arrays on some files: they get a process of their own.
+_SCRIPT = """
+import sys, numpy, pyvista
+grid = pyvista.read(sys.argv[1])
+if isinstance(grid, pyvista.MultiBlock):
+    grid = grid.combine()
+grid = grid.cast_to_unstructured_grid()
+arrays = {"points": grid.points, "types": grid.celltypes, "cells": grid.cell_connectivity,
+          "offsets": grid.offset}
+for prefix, data in (("p:", grid.point_data), ("c:", grid.cell_data)):
+    for name in data.keys():
+        if numpy.asarray(data[name]).dtype.kind in "biuf":
+            arrays[prefix + name.replace("/", "_")] = numpy.asarray(data[name])
+numpy.savez(sys.argv[2], **arrays)
+"""
+
+
+def is_for_vtk_alone(path: Path) -> bool:
+    """Whether a ``.vtk`` file is of a kind meshio does not know: a surface, or 64-bit data."""
+    return _NOT_FOR_MESHIO.search(path.read_bytes()) is not None
+
+
+def read_pyvista(path: Path) -> MeshArrays:
+    """Read a file by VTK: ``.vtp``, and ``.vtk`` of the kinds that meshio does not know.
+
+    Raises
+    ------
+    FileFormatError
+        VTK complains, or the cells are of other kinds than triangles, polygons and tets.
+    MissingDependencyError
+        PyVista is not installed.
+    """
+    if importlib.util.find_spec("pyvista") is None:
+        raise MissingDependencyError(
+            f"reading {path.suffix} files needs pyvista: pip install 'stretchmap[viz]'"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder, "grid.npz")
+        run = subprocess.run(
+            [sys.executable, "-c", _SCRIPT, str(path.resolve()), str(out)],
+            capture_output=True, text=True, errors="replace", cwd=folder, check=False,
+        )  # fmt: skip
+        said = [line for line in run.stderr.splitlines() if line.strip()]
+        if run.returncode or not out.exists() or any("ERR" in line for line in said):
+            raise FileFormatError(f"VTK cannot read it: {said[-1] if said else 'no reason given'}")
+        with open(out, "rb") as file:
+            arrays = read_archive(file)
+    points, offsets = arrays["points"], arrays["offsets"].astype(np.int64)
+    sizes = np.diff(offsets)
+    named = np.unique(arrays["cells"])
+    if len(named) and not 0 <= named[0] <= named[-1] < len(points):
+        raise FileFormatError("cells name points that are not there")
+    cell_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "c:"}
+    blocks = []
+    for kind, size in np.unique(np.stack([arrays["types"], sizes]), axis=1).T.tolist():
+        rows = np.flatnonzero((arrays["types"] == kind) & (sizes == size))
+        cells = arrays["cells"][offsets[rows, None] + np.arange(size)]
+        data = {name: array[rows] for name, array in cell_data.items()}
+        blocks.append(Block(_VTK.get(kind, f"cells of VTK's type {kind}"), cells, data))
+    point_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "p:"}
+    return simplices(points, blocks, point_data)
+
+
+def read_trimesh(path: Path) -> MeshArrays:
+    """Read a scene by trimesh: all its parts, placed; equal corners become one vertex.
+
+    Raises
+    ------
+    FileFormatError
+        It cannot be read or holds no triangles.
+    MissingDependencyError
+        trimesh, or what it needs for the format, is not installed.
+    """
+    try:
+        import trimesh
+
+        scene = trimesh.load_scene(str(path), process=False)
+        mesh: Any = scene.to_mesh()
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"reading {path.suffix} files needs trimesh and {error.name}: "
+            "pip install 'stretchmap[interop]' networkx lxml"
+        ) from error
+    if not len(mesh.faces):
+        raise FileFormatError("it holds no triangles")
+    corners: NDArray[Any] = np.asarray(mesh.vertices, float)
+    points, ids = np.unique(corners + 0.0, axis=0, return_inverse=True)
+    return MeshArrays(points, F=ids.reshape(-1)[np.asarray(mesh.faces)])

@@ -1,0 +1,197 @@
+"""Elements of higher order, quads, Gmsh's own files, and those other packages read."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap.errors import FileFormatError
+from stretchmap.io import read, read_arrays
+
+# Two tets of a physical group, one of none, a triangle and a point beside them; tags with gaps.
+GMSH = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+3 7 "the bone"
+$EndPhysicalNames
+$Entities
+1 0 1 2
+9 0 0 0 0
+4 0 0 0 1 1 1 0 0
+1 0 0 0 1 1 1 1 7 1 4
+2 0 0 0 1 1 1 0 0
+$EndEntities
+$Nodes
+2 6 10 99
+3 1 0 4
+10
+20
+30
+40
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+3 2 1 2
+99
+50
+1 1 1 0 0 0
+2 0 0 0 0 0
+$EndNodes
+$Elements
+4 5 1 5
+0 9 15 1
+1 10
+2 4 2 1
+2 10 20 30
+3 1 4 2
+3 10 20 30 40
+4 20 30 40 99
+3 2 4 1
+5 20 99 40 50
+$EndElements
+$ElementData
+1
+"heat"
+1
+0.0
+3
+0
+1
+2
+4 0.5
+5 1.5
+$EndElementData
+"""
+
+
+def test_gmsh_with_groups_of_some_entities(tmp_path):
+    path = tmp_path / "part.msh"
+    path.write_text(GMSH)
+    found = read_arrays(path)
+    np.testing.assert_array_equal(found.V[4:], [[1, 1, 1], [2, 0, 0]])
+    np.testing.assert_array_equal(found.T, [[0, 1, 2, 3], [1, 2, 3, 4], [1, 4, 3, 5]])
+    np.testing.assert_array_equal(found.cell_data["gmsh:physical"], [7, 7, 0])
+    np.testing.assert_array_equal(found.cell_data["gmsh:geometrical"], [1, 1, 2])
+    np.testing.assert_array_equal(found.cell_data["heat"], [np.nan, 0.5, 1.5])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("2 6 10 99", "2 7 10 99"), "7 nodes are announced, 6 follow"),
+        (("3 10 20 30 40", "3 10 20 30 41"), "not there"),
+        (("\n50\n", "\n99\n"), "one tag"),
+        (("4 5 1 5", "4 6 1 5"), "6 elements are announced"),
+        (("3 2 4 1\n", "3 2 94 1\n"), "type 94"),
+        (("$EndElements", "$End"), "within a section"),
+        (("4.1 0 8\n", "4.1 1 8\n"), "another kind of machine"),
+    ],
+)
+def test_gmsh_files_that_are_wrong(change, message, tmp_path):
+    assert change[0] in GMSH
+    path = tmp_path / "part.msh"
+    path.write_text(GMSH.replace(*change))
+    with pytest.raises(FileFormatError, match=message):
+        read(path)
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_gmsh_as_meshio_writes_it(binary, tmp_path):
+    meshio = pytest.importorskip("meshio")
+    solid = sm.samples.solid_torus(600)
+    data = {"gmsh:physical": [np.arange(solid.n_tets)], "gmsh:geometrical": [np.ones(solid.n_tets)]}
+    data = {name: [a.astype(np.int32) for a in parts] for name, parts in data.items()}
+    mesh = meshio.Mesh(solid.V, [("tetra", solid.T)], cell_data=data)
+    mesh.write(tmp_path / "t.msh", file_format="gmsh", binary=binary)
+    found = read_arrays(tmp_path / "t.msh")
+    np.testing.assert_array_equal(found.V, solid.V)
+    np.testing.assert_array_equal(found.T, solid.T)
+
+
+def quadratic(solid: sm.TetMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Points and tets with a point in the middle of each edge, in the order of VTK."""
+    pairs = np.sort(solid.T[:, [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]]], axis=2)
+    edges, ids = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    middle = solid.V[edges].mean(axis=1)
+    cells = np.hstack([solid.T, ids.reshape(-1, 6) + solid.n_vertices])
+    return np.vstack([solid.V, middle]), cells
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk", ".msh"])
+def test_tets_of_second_order_are_taken_by_their_corners(suffix, tmp_path, caplog):
+    meshio = pytest.importorskip("meshio")
+    solid = sm.samples.solid_torus(600)
+    points, cells = quadratic(solid)
+    data = {"height": points[:, 2]} if suffix != ".msh" else {}
+    mesh = meshio.Mesh(points, [("tetra10", cells)], point_data=data)
+    mesh.write(tmp_path / f"t{suffix}", file_format={".msh": "gmsh"}.get(suffix, suffix[1:]))
+    with caplog.at_level(logging.WARNING, logger="stretchmap"):
+        found = read_arrays(tmp_path / f"t{suffix}")
+    left_out = len(points) - solid.n_vertices
+    assert f"{solid.n_tets} elements of higher order" in caplog.text
+    assert f"{left_out} points left out" in caplog.text
+    np.testing.assert_array_equal(found.V, solid.V)
+    np.testing.assert_array_equal(found.T, solid.T)
+    assert all(len(array) == solid.n_vertices for array in found.point_data.values())
+
+
+def test_quads_of_a_surface_are_split_and_hexahedra_refused(tmp_path, caplog):
+    meshio = pytest.importorskip("meshio")
+    points = np.array([[x, y, 0.0] for y in range(2) for x in range(3)])
+    cells = [("quad", np.array([[0, 1, 4, 3]])), ("triangle", np.array([[1, 2, 5], [1, 5, 4]]))]
+    data = {"part": [np.array([7]), np.array([8, 9])]}
+    meshio.Mesh(points, cells, cell_data=data).write(tmp_path / "t.vtu")
+    with caplog.at_level(logging.WARNING, logger="stretchmap"):
+        found = read_arrays(tmp_path / "t.vtu")
+    assert "1 polygons were split into 2 triangles" in caplog.text
+    np.testing.assert_array_equal(found.F, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
+    np.testing.assert_array_equal(found.cell_data["part"], [7, 7, 8, 9])
+
+
+@pytest.mark.parametrize("name", ["t.vtp", "t.vtk"])
+def test_surfaces_as_pyvista_saves_them(name, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    torus = sm.samples.torus_surface(12, 8)
+    data = torus.to_pyvista()
+    data.cell_data["part"] = np.arange(torus.n_faces)  # 64 bits
+    data.save(tmp_path / name)
+    found = read_arrays(tmp_path / name)
+    np.testing.assert_array_equal(found.V, torus.V)
+    np.testing.assert_array_equal(found.F, torus.F)
+    np.testing.assert_array_equal(found.cell_data["part"], np.arange(torus.n_faces))
+    (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:900])
+    with pytest.raises(FileFormatError, match=name):
+        read(tmp_path / name)
+    assert pyvista
+
+
+def test_solids_as_pyvista_saves_them(tmp_path):
+    pytest.importorskip("pyvista")
+    solid = sm.samples.solid_torus(600)
+    data = solid.to_pyvista()
+    data.cell_data["part"] = np.arange(solid.n_tets)
+    for binary in (True, False):
+        data.save(tmp_path / "t.vtk", binary=binary)
+        found = read_arrays(tmp_path / "t.vtk")
+        np.testing.assert_allclose(found.V, solid.V, atol=0 if binary else 1e-5)
+        np.testing.assert_array_equal(found.T, solid.T)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".3mf"])
+def test_surfaces_as_trimesh_exports_them(suffix, tmp_path):
+    pytest.importorskip("trimesh")
+    if suffix == ".3mf":
+        pytest.importorskip("lxml")
+        pytest.importorskip("networkx")
+    torus = sm.samples.torus_surface(12, 8)
+    torus.to_trimesh().export(tmp_path / f"t{suffix}")
+    mesh = read(tmp_path / f"t{suffix}")
+    mesh.require_genus_one()
+    assert (mesh.n_vertices, mesh.n_faces) == (torus.n_vertices, torus.n_faces)
+    assert mesh.volume == pytest.approx(torus.volume, rel=1e-5)
