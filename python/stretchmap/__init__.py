@@ -38,6 +38,7 @@ if hasattr(os, "register_at_fork"):
 if TYPE_CHECKING:
     from . import errors as errors
     from . import plot as plot
+    from . import population as population
     from . import samples as samples
     from .area.map import AreaMap as AreaMap
     from .area.map import area_map as area_map
@@ -156,7 +157,7 @@ _EXPORTS = {
     "Morph": "plot.morphing",
     "morph": "plot.morphing",
 }
-_ROOMS = ("errors", "plot", "samples")
+_ROOMS = ("errors", "plot", "population", "samples")
 
 __all__ = ["__version__", *_EXPORTS, *_ROOMS]
 

@@ -20,7 +20,7 @@ __all__ = ["VertebraPopulation", "vertebra_population"]
 
 # Share of the size that the mean displacement of a mode is worth at one standard deviation.
 _SPREAD = (0.02, 0.013, 0.008, 0.005)
-_LARGEST_SCORE = 2.0  # scores are normal, cut off here
+_LARGEST_SCORE = 2.0  # of few individuals: normal, cut off here
 _STATIONS, _SIXTHS = 12, 6  # landmarks sit at the crossings of these lines
 
 
@@ -45,7 +45,8 @@ class VertebraPopulation:
         Displacements of the reference's vertices at one standard deviation; on a dense set of
         points of the solid orthogonal to each other and to translations, rotations and scaling.
     scores : ndarray, shape (k, m)
-        In standard deviations.
+        In standard deviations. Of m + 2 individuals or more: of mean 0, variance 1 and not
+        correlated, so that the modes are the principal components of this very sample.
     landmarks : ndarray, shape (k, l, 3)
         Points on the surface of every individual that correspond.
     poses : ndarray, shape (k, 4, 3)
@@ -210,9 +211,7 @@ def vertebra_population(
     size = float(np.linalg.norm(np.ptp(reference.V, axis=0)))
     dense = embed(*parameters(4, 96)).reshape(-1, 3)
     fields = _ModeFields.of(dense, size, np.array(_SPREAD))
-    scores = spread * np.clip(
-        rng.standard_normal((n, len(_SPREAD))), -_LARGEST_SCORE, _LARGEST_SCORE
-    )
+    scores = spread * _scores(rng, n)
     poses = np.stack([_pose(rng, size) for _ in range(n)])
     rests = [_remeshed(rng, n_tets) for _ in range(n)]
     sites = np.sort(rng.permutation(_STATIONS * _SIXTHS)[:n_landmarks])
@@ -240,6 +239,15 @@ def vertebra_population(
         poses=poses,
         _deformation=deformation,
     )
+
+
+def _scores(rng: np.random.Generator, n: int) -> Array:
+    """Normal scores (n, m), whitened where there are enough individuals."""
+    drawn = rng.standard_normal((n, len(_SPREAD)))
+    if n <= len(_SPREAD) + 1:
+        return np.clip(drawn, -_LARGEST_SCORE, _LARGEST_SCORE)
+    centered = drawn - drawn.mean(axis=0)
+    return np.asarray(np.linalg.qr(centered)[0] * np.sqrt(n - 1.0))
 
 
 def _pose(rng: np.random.Generator, size: float) -> Array:

@@ -22,7 +22,9 @@ CHAIN = (
     ("area",),
     ("volume",),
     ("registration",),
-    ("resample", "plot"),
+    ("resample",),
+    ("population",),
+    ("plot",),
     ("cli",),
 )
 FLOOR = {room: floor for floor, rooms in enumerate(CHAIN) for room in rooms}

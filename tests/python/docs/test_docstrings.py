@@ -15,7 +15,7 @@ import pytest
 
 import stretchmap
 
-ROOMS = ("samples", "io", "plot", "plot.scene", "plot.report", "mesh.refinement")
+ROOMS = ("samples", "io", "population", "plot", "plot.scene", "plot.report", "mesh.refinement")
 ROOMS += ("mesh.overconstrained", "registration.suggest", "conformal.hodge")
 
 

@@ -1,0 +1,230 @@
+"""The map from a template to one solid of a population."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from ..certificate.findings import Certificate
+from ..errors import MeshError, SolverError
+from ..maps.result import MapResult
+from ..mesh.meshes import TetMesh, TriMesh
+from ..registration.map import Registration, register
+from ..volume.fill import FillMap, fill
+from ..volume.options import FillOptions
+from .fitting import Fit, Template, fit_surface
+from .pose import rigid_poses
+from .procrustes import Similarity, similarity_onto
+
+__all__ = ["Correspondence", "correspond"]
+
+Along = Literal["smooth", "area"]
+
+_SMOOTHINGS = 20  # rounds in which vertices round faces that cross go to the middle of their rings
+_MOST_PAIRS = 10_000
+_NEARLY = 2.0  # energy of a stiff fit over the least, of poses that are looked at further
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Correspondence(MapResult):
+    """A map from a template onto one solid of a population.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        The template, refined if refinement was needed; its own vertices come first.
+    target : TetMesh
+        The solid.
+    image : ndarray, shape (n, 3)
+        Boundary vertices go to the boundary.
+    certificate : Certificate
+    along : str
+        What decided along the surface, ``"smooth"`` or ``"area"``. ``"area"`` although ``"smooth"``
+        was asked for means that the smooth one could not be certified; ``note`` says why.
+    note : str
+    distance : float
+        Root mean square distance of the smooth deformation from the surface before its points were
+        put onto it, over the size; NaN for ``"area"``.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.population import correspond
+    >>> bones = sm.samples.vertebra_population(2, n_tets=600)
+    >>> found = correspond(bones.solids[0], bones.solids[1])
+    >>> found.certificate.certified, found.along
+    (True, 'smooth')
+    """
+
+    _title: ClassVar[str] = "correspondence"
+
+    mesh: TetMesh
+    target: TetMesh = field()
+    certificate: Certificate
+    along: str
+    note: str
+    distance: float
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """Certificate, and how the correspondence came about."""
+        return {
+            "certified": self.certificate.certified,
+            "certificate": self.certificate.to_dict(),
+            "along": self.along,
+            "note": self.note,
+            "distance": self.distance if np.isfinite(self.distance) else None,
+        }
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """The target (``target_V``, ``target_T``)."""
+        return {"target_V": self.target.V, "target_T": self.target.T}
+
+
+def correspond(
+    template: TetMesh | Template,
+    solid: TetMesh,
+    *,
+    start: Array | None = None,
+    landmarks: Array | None = None,
+    along: Along = "smooth",
+    volume_weight: float = 1.0,
+) -> Correspondence:
+    """Map a template onto a solid, point to corresponding point.
+
+    Parameters
+    ----------
+    template : TetMesh or Template
+        With a `Template` what is computed of it once serves for many solids.
+    solid : TetMesh
+        Both are solid tori.
+    start : ndarray, shape (nb, 3), optional
+        Where the template's boundary vertices go about. Without it the template is laid on the
+        solid by landmarks, if there are three or more, or by the surfaces as rigid bodies.
+    landmarks : ndarray, shape (l, 3), optional
+        Where the landmarks of the template (``Template.anchors``) lie on the solid.
+    along : {"smooth", "area"}
+        What decides along the surface. ``"smooth"``: the smoothest deformation that brings surface
+        onto surface, and inside the map of least distortion. ``"area"``: `register`, which keeps
+        areas on the surface and volumes inside.
+    volume_weight : float
+        Of ``"smooth"``: weight of equal volumes against equal shape inside, as in `FillOptions`.
+
+    Returns
+    -------
+    Correspondence
+
+    Raises
+    ------
+    MeshError
+        A mesh is no solid torus.
+    CertificationError, SolverError
+        No map could be certified.
+    LandmarkError
+        Landmarks contradict each other.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.population import correspond
+    >>> solid = sm.samples.vertebra_like(600)
+    >>> correspond(solid, solid, along="area").distortion.flips
+    0
+    """
+    clock = time.perf_counter()
+    given = template if isinstance(template, Template) else Template(template)
+    found: Registration | FillMap | None = None
+    note, distance = "", float("nan")
+    if along == "smooth":
+        found, distance, note = _smooth(given, solid, start, landmarks, volume_weight)
+    if found is None:
+        found = _registered(given, solid, landmarks)
+    return Correspondence(
+        mesh=found.mesh,
+        target=solid,
+        image=found.image,
+        certificate=found.certificate,
+        along="area" if note or along == "area" else "smooth",
+        note=note,
+        distance=distance,
+        history=found.history,
+        converged=found.converged,
+        stop_reason=found.stop_reason,
+        seconds={"all": time.perf_counter() - clock},
+    )
+
+
+def _registered(template: Template, solid: TetMesh, landmarks: Array | None) -> Registration:
+    if landmarks is None or template.anchors is None:
+        return register(template.solid, solid)
+    surface = template.solid.surface
+    return register(template.solid, solid, (template.anchors.at(surface.V, surface.F), landmarks))
+
+
+def _smooth(
+    template: Template,
+    solid: TetMesh,
+    start: Array | None,
+    landmarks: Array | None,
+    volume_weight: float,
+) -> tuple[FillMap | None, float, str]:
+    """The smooth map, the distance of the deformation from the surface; or why there is none."""
+    surface = template.solid.surface
+    if start is not None:
+        poses = [similarity_onto(surface.V, start)]
+    elif landmarks is not None and template.anchors is not None and len(landmarks) >= 3:
+        poses = [similarity_onto(template.anchors.at(surface.V, surface.F), landmarks)]
+    else:
+        poses = rigid_poses(surface, solid.surface)
+    if len(poses) > 1:
+        coarse = [_fitted(template, solid, pose, start, landmarks, True).energy for pose in poses]
+        poses = [p for p, e in zip(poses, coarse, strict=True) if e <= _NEARLY * min(coarse)]
+    fits = [_fitted(template, solid, pose, start, landmarks) for pose in poses]
+    best = min(range(len(fits)), key=lambda i: fits[i].energy)
+    pose, fitted = poses[best], fits[best]
+    distance = fitted.distance / template.spline.length
+    goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)
+    points = pose(_settled(template, goal, fitted.projected))
+    options = FillOptions(volume_weight=volume_weight)
+    try:
+        return fill(template.solid, points, options=options), distance, ""
+    except (MeshError, SolverError) as error:
+        return None, distance, f"smooth correspondence given up: {error}"
+
+
+def _fitted(
+    template: Template,
+    solid: TetMesh,
+    pose: Similarity,
+    start: Array | None,
+    landmarks: Array | None,
+    coarse: bool = False,
+) -> Fit:
+    """The fit in the pose of the template."""
+    goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)
+    begin = template.solid.surface.V if start is None else pose.back(start)
+    held = None if landmarks is None else pose.back(landmarks)
+    return fit_surface(template, goal, begin, held, coarse=coarse)
+
+
+def _settled(template: Template, goal: TriMesh, points: Array) -> Array:
+    """Points of the goal, moved along it where faces of the template cross.
+
+    Closest points of neighbors may change their order where the goal is sharper than the spline.
+    """
+    F = template.solid.surface.F
+    tree = _core.maps.SurfaceTree(goal.V, goal.F)
+    settled = np.ascontiguousarray(points)
+    for _ in range(_SMOOTHINGS):
+        crossing = _core.certificate.crossing_faces(settled, F, _MOST_PAIRS)
+        if not len(crossing):
+            break
+        moving = np.unique(F[np.unique(crossing)])
+        settled[moving] = tree.closest((template.ring_mean @ settled)[moving])[0]
+    return settled

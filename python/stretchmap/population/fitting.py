@@ -1,0 +1,255 @@
+"""The smoothest deformation of a template that brings its surface onto another.
+
+What corresponds along the surface is decided by smoothness alone: points are drawn along normals
+only. So nothing slides to even out areas, as it does where areas are to be preserved.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .. import _core
+from ..mesh.meshes import TetMesh, TriMesh
+from .thin_plate import ThinPlate, solve_dense
+
+__all__ = ["Anchors", "Fit", "Template", "fit_surface"]
+
+_SITES = 120  # of the spline
+# Weights of the bending energy, one after the other, against the mean square distance.
+_STIFFNESS = (1e-3, 1e-4, 1e-5)
+_STEPS, _AT_REST = (
+    12,
+    1e-4,
+)  # most steps with each; a step that moves by less, over the size, ends it
+_SAME_WAY = 0.5  # least cosine between normals of points drawn to each other
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """Points fixed to the faces of a surface.
+
+    Attributes
+    ----------
+    faces : ndarray of int32, shape (l,)
+    weights : ndarray, shape (l, 3)
+        Barycentric coordinates.
+    """
+
+    faces: NDArray[np.int32]
+    weights: Array
+
+    @classmethod
+    def of(cls, surface: TriMesh, points: Array) -> Anchors:
+        """The closest points of the surface."""
+        tree = _core.maps.SurfaceTree(surface.V, surface.F)
+        _, faces, weights = tree.closest(np.ascontiguousarray(points))
+        return cls(faces, weights)
+
+    def at(self, values: Array, faces: NDArray[np.int32]) -> Array:
+        """Values (l, c) at the points from values at the vertices (n, c)."""
+        return np.asarray(np.einsum("lk,lkc->lc", self.weights, values[faces[self.faces]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """A solid prepared for being deformed onto others.
+
+    Attributes
+    ----------
+    solid : TetMesh
+    anchors : Anchors or None
+        Its landmarks.
+    """
+
+    solid: TetMesh
+    anchors: Anchors | None = None
+
+    @cached_property
+    def spline(self) -> ThinPlate:
+        """Sites on the surface, where forces act."""
+        return ThinPlate.of(self.solid.surface.V, _SITES)
+
+    @cached_property
+    def features(self) -> Array:
+        """Of the spline, at the surface's vertices."""
+        return self.spline.features(self.solid.surface.V)
+
+    @cached_property
+    def ring_mean(self) -> sp.csr_matrix:
+        """(nb, nb) Takes values at the surface's vertices to the means of their neighbors."""
+        edges, n = self.solid.surface.edges, self.solid.surface.n_vertices
+        ends = np.concatenate([edges, edges[:, ::-1]])
+        degree = np.bincount(ends[:, 0], minlength=n)
+        shares = 1.0 / degree[ends[:, 0]]
+        return sp.csr_matrix((shares, (ends[:, 0], ends[:, 1])), shape=(n, n))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What `fit_surface` found.
+
+    Attributes
+    ----------
+    points : ndarray, shape (nb, 3)
+        Where the spline takes the template's boundary vertices.
+    projected : ndarray, shape (nb, 3)
+        The closest points of the goal.
+    distance : float
+        Root mean square between the two.
+    step : float
+        Of the last step, largest over the vertices; zero or nearly if it came to rest.
+    energy : float
+        Of bending and distance: the least of several fits is the one to be believed.
+    """
+
+    points: Array
+    projected: Array
+    distance: float
+    step: float
+    energy: float
+
+
+def fit_surface(
+    template: Template,
+    goal: TriMesh,
+    start: Array,
+    landmarks: Array | None,
+    *,
+    coarse: bool = False,
+) -> Fit:
+    """Lay the template's surface onto a goal in the same pose, by the smoothest deformation.
+
+    Parameters
+    ----------
+    template : Template
+    goal : TriMesh
+    start : ndarray, shape (nb, 3)
+        A first guess of where the boundary vertices go.
+    landmarks : ndarray, shape (l, 3), or None
+        Where the template's landmarks belong.
+    coarse : bool
+        Stop at the stiffest.
+
+    Returns
+    -------
+    Fit
+
+    Notes
+    -----
+    Iterative closest points with normals, from either surface to the other, the stiffness lowered
+    in steps (Chen and Medioni 1992; Amberg, Romdhani, Vetter, CVPR 2007). Pairs whose normals are
+    more than 60 degrees apart are left out.
+    """
+    surface, spline = template.solid.surface, template.spline
+    rest, F = surface.V, surface.F
+    side = _Side(goal.V, goal.F)
+    coefficients = _guess(template, start - rest)
+    step = np.inf
+    for stiffness in _STIFFNESS[:1] if coarse else _STIFFNESS:
+        for _ in range(_STEPS):
+            points = rest + template.features @ coefficients
+            equations = _Equations(len(spline.bending), stiffness * spline.bending)
+            _draw(equations, template, _Side(points, F), side)
+            if landmarks is not None and template.anchors is not None:
+                features = template.anchors.at(template.features, F)
+                equations.hold(features, landmarks - template.anchors.at(rest, F))
+            found = equations.solution()
+            step = float(np.abs(template.features @ (found - coefficients)).max())
+            coefficients = found
+            if step < _AT_REST * spline.length:
+                break
+    points = np.ascontiguousarray(rest + template.features @ coefficients)
+    projected = side.tree.closest(points)[0]
+    square = float(((projected - points) ** 2).sum(axis=1).mean())
+    bending = float(np.einsum("rk,rs,sk->", coefficients, spline.bending, coefficients))
+    energy = square + _STIFFNESS[0] * bending
+    return Fit(points, projected, math.sqrt(square), step, energy)
+
+
+class _Side:
+    """One of the two surfaces, with what closest points need."""
+
+    def __init__(self, points: Array, faces: NDArray[np.int32]) -> None:
+        self.V, self.F = np.ascontiguousarray(points), faces
+        self.tree = _core.maps.SurfaceTree(self.V, self.F)
+        areas = _core.mesh.face_area_vectors(self.V, self.F)
+        sums = [
+            np.bincount(self.F.ravel(), np.repeat(column, 3), minlength=len(self.V))
+            for column in areas.T
+        ]
+        self.normals = _unit(np.stack(sums, axis=1))
+
+
+class _Equations:
+    """Normal equations for coefficients (r, 3), as blocks of the three coordinates."""
+
+    def __init__(self, size: int, penalty: Array) -> None:
+        self.size = size
+        self.matrix = np.zeros((3, size, 3, size))
+        self.right = np.zeros((3, size))
+        for k in range(3):
+            self.matrix[k, :, k] = penalty
+
+    def draw(self, features: Array, normals: Array, gaps: Array, weight: float) -> None:
+        """Displacements along normals (n, 3) are to be the gaps (n,)."""
+        for a in range(3):
+            left = np.ascontiguousarray((weight * normals[:, a, None] * features).T)
+            self.right[a] += np.einsum("rn,n->r", left, gaps)
+            for b in range(a, 3):
+                block = left @ (normals[:, b, None] * features)
+                self.matrix[a, :, b] += block
+                if b != a:
+                    self.matrix[b, :, a] += block.T
+
+    def hold(self, features: Array, displacements: Array) -> None:
+        """Displacements of landmarks are to be these (l, 3), in the mean."""
+        block = np.einsum("lr,ls->rs", features, features) / len(features)
+        for k in range(3):
+            self.matrix[k, :, k] += block
+            self.right[k] += np.einsum("lr,l->r", features, displacements[:, k]) / len(features)
+
+    def solution(self) -> Array:
+        n = 3 * self.size
+        solved = solve_dense(self.matrix.reshape(n, n), self.right.ravel())
+        return np.ascontiguousarray(solved.reshape(3, self.size).T)
+
+
+def _guess(template: Template, displacements: Array) -> Array:
+    """Stiff coefficients nearest to displacements of the boundary vertices."""
+    spline = template.spline
+    equations = _Equations(len(spline.bending), _STIFFNESS[0] * spline.bending)
+    equations.hold(template.features, displacements)
+    return equations.solution()
+
+
+def _draw(equations: _Equations, template: Template, moved: _Side, goal: _Side) -> None:
+    """Pairs of closest points, from the moved template to the goal and back."""
+    rest, features = template.solid.surface.V, template.features
+    total = len(moved.V) + len(goal.V)
+    feet, faces, weights = goal.tree.closest(moved.V)
+    normals = _unit(np.einsum("nk,nkx->nx", weights, goal.normals[goal.F[faces]]))
+    near = np.einsum("nx,nx->n", normals, moved.normals) > _SAME_WAY
+    gaps = np.einsum("nx,nx->n", normals, feet - rest)
+    equations.draw(features[near], normals[near], gaps[near], 1.0 / total)
+
+    _, faces, weights = moved.tree.closest(goal.V)
+    corners = moved.F[faces]
+    normals = _unit(np.einsum("nk,nkx->nx", weights, moved.normals[corners]))
+    near = np.einsum("nx,nx->n", normals, goal.normals) > _SAME_WAY
+    corners, weights, normals = corners[near], weights[near], goal.normals[near]
+    gaps = goal.V[near] - np.einsum("nk,nkx->nx", weights, rest[corners])
+    there = np.einsum("nk,nkr->nr", weights, features[corners])
+    equations.draw(there, normals, np.einsum("nx,nx->n", normals, gaps), 1.0 / total)
+
+
+def _unit(vectors: Array) -> Array:
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(lengths > 0.0, lengths, 1.0))

@@ -1,0 +1,91 @@
+"""Maps from a template to solids of a population: certified, and true to the material."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from population.truth import correspondence_errors, size
+from stretchmap.population import correspond
+from stretchmap.population.fitting import Anchors, Template, fit_surface
+from stretchmap.population.pose import rigid_poses
+from stretchmap.population.thin_plate import ThinPlate
+
+
+@pytest.fixture(scope="module")
+def bones():
+    return sm.samples.vertebra_population(6, seed=2, n_tets=3000)
+
+
+@pytest.mark.parametrize("along", ["smooth", "area"])
+def test_maps_are_certified_and_end_on_the_surface(bones, along):
+    found = correspond(bones.solids[0], bones.solids[1], along=along)
+    assert found.certificate.certified and found.along == along and not found.note
+    goal = bones.solids[1].surface
+    boundary = found.image[bones.solids[0].boundary_vertices]
+    feet = sm._core.maps.SurfaceTree(goal.V, goal.F).closest(boundary)[0]
+    assert np.abs(feet - boundary).max() < 1e-9 * size(goal.V)
+
+
+def test_smoothness_finds_what_areas_miss(bones):
+    template, n = bones.solids[0], bones.solids[0].n_vertices
+    errors = {}
+    for along in ("smooth", "area"):
+        points = [correspond(template, bones.solids[i], along=along).image[:n] for i in (1, 2)]
+        found, _ = correspondence_errors(bones, [template.V, *points], (0, 1, 2))
+        errors[along] = np.median(found)
+    assert errors["smooth"] < 0.004 < errors["area"] and errors["smooth"] < 0.5 * errors["area"]
+
+
+def test_a_pose_that_looks_as_good_is_not_taken():
+    """Individuals whose processes resemble each other: the closest rigid pose is a third of a turn
+    off, and bending tells."""
+    bones = sm.samples.vertebra_population(6, seed=7, n_tets=3000)
+    source, target = bones.solids[0], bones.solids[2]
+    truth = bones.place(2, bones.material[0])
+    first = rigid_poses(source.surface, target.surface)[0](source.V)
+    assert np.median(np.linalg.norm(first - truth, axis=1)) > 0.1 * size(truth)
+    found = correspond(source, target).image[: source.n_vertices]
+    assert np.median(np.linalg.norm(found - truth, axis=1)) < 0.01 * size(truth)
+
+
+def test_affine_maps_are_recovered_exactly(bones):
+    template = Template(bones.solids[0])
+    matrix = np.eye(3) + 0.05 * np.random.default_rng(3).standard_normal((3, 3))
+    goal = sm.TriMesh(template.solid.surface.V @ matrix + [0.1, 0.0, 0.2], template.solid.surface.F)
+    fitted = fit_surface(template, goal, template.solid.surface.V, None)
+    assert np.abs(fitted.points - goal.V).max() < 1e-3 * size(goal.V)
+    assert fitted.distance < 1e-4 * size(goal.V)
+
+
+def test_affine_maps_do_not_bend():
+    points = np.random.default_rng(0).standard_normal((200, 3))
+    spline = ThinPlate.of(points, 40)
+    coefficients = np.zeros(len(spline.bending))
+    coefficients[:4] = [0.3, 1.0, -2.0, 0.5]
+    assert coefficients @ spline.bending @ coefficients == 0.0
+    assert np.linalg.eigvalsh(spline.bending)[4:].min() > 0.0
+    assert np.abs(spline.projector @ np.column_stack([np.ones(40), spline.sites])).max() < 1e-12
+
+
+def test_landmarks_draw(bones):
+    solid = bones.solids[0]
+    at = solid.surface.V[[10, 200]]
+    template = Template(solid, Anchors.of(solid.surface, at))
+    moved = at + np.array([[0.03 * size(solid.V), 0.0, 0.0], [0.0, 0.0, 0.0]])
+    free, held = (
+        fit_surface(template, solid.surface, solid.surface.V, marks) for marks in (None, moved)
+    )
+    gaps = [
+        np.linalg.norm(template.anchors.at(f.points, solid.surface.F) - moved, axis=1)
+        for f in (free, held)
+    ]
+    assert gaps[1][0] < 0.3 * gaps[0][0]
+
+
+def test_a_goal_that_cannot_be_reached_smoothly_is_told():
+    template, goal = sm.samples.solid_torus(1500), sm.samples.bumpy_torus(4000, amplitude=0.6)
+    found = correspond(template, goal)
+    assert found.certificate.certified
+    assert (found.along == "smooth") == (not found.note)
