@@ -25,9 +25,9 @@ class ModelMeasures:
     ----------
     compactness : ndarray, shape (m + 1,)
         Share of the variance that the first modes explain.
-    generalization : ndarray, shape (m, k)
-        Distance of every shape from what the model of all others makes of it, with 0 to m - 1
-        modes (a model of one shape less has a mode less).
+    generalization : ndarray, shape (min(m, k - 2) + 1, k)
+        Distance of every shape from what the model of all others makes of it; that has k - 2 modes
+        at most.
     specificity : ndarray, shape (m + 1, s)
         Distance of every random shape of the model from the nearest shape it was made from.
 
@@ -91,7 +91,7 @@ def measure_model(model: ShapeModel, *, n_samples: int = 200, seed: int = 0) -> 
     shares = model.variances / total if total > 0.0 else np.zeros(model.n_modes)
     return ModelMeasures(
         compactness=read_only(np.concatenate([[0.0], np.cumsum(shares)])),
-        generalization=read_only(_left_out(shapes, max(model.n_modes, 1))),
+        generalization=read_only(_left_out(shapes, min(model.n_modes, len(shapes) - 2) + 1)),
         specificity=read_only(_specificity(model, shapes, n_samples, seed)),
     )
 

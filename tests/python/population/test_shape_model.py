@@ -66,11 +66,11 @@ def test_measures_of_a_model_of_one_mode():
 def test_more_modes_generalize_better():
     shapes, *_ = planted(k=12, deviations=(4.0, 2.0, 1.0))
     noisy = shapes + 0.01 * RNG.standard_normal(shapes.shape)
-    found = measure_model(shape_model(noisy), n_samples=20)
+    found = measure_model(shape_model(noisy), n_samples=200)
     means = found.generalization.mean(axis=1)
     assert (np.diff(means) < 1e-6).all()
     assert means[3] < 0.03 < 0.1 < means[2]  # three modes are what there is, the rest is noise
-    assert (np.diff(found.specificity[:4].mean(axis=1)) > 0).all()
+    assert (np.diff(found.specificity[1:4].mean(axis=1)) > 0).all()  # with none it is the mean
 
 
 @pytest.mark.parametrize("call", [
