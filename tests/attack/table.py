@@ -274,7 +274,7 @@ METHODS: dict[str, tuple[Callable[[Sound], Any], tuple[str, ...]]] = {
     "AreaMap": (lambda s: s.area_map, ("image_on",)),
     "VolumeMap": (
         lambda s: s.map,
-        ("forward", "inverse", "coordinates", "save", "to_dict", "to_json"),
+        ("forward", "inverse", "coordinates", "save", "to_dict", "to_json", "with_fields"),
     ),
     "PointMap": (lambda s: s.map.point_map, ("forward", "inverse")),
     "Located": (lambda s: s.located, ("interpolate",)),

@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 _log = logging.getLogger("stretchmap")
 
 _MESH = "Mesh: .npz (V with F or T) .obj .off .ply .stl .msh .vtu .vtk .mesh .xdmf .vtp .glb .3mf"
+_MAP = "Map file: .npz with V, F or T, and image; .vtu, .vtk, .xdmf as written for viewers."
 
 Input = Annotated[Path, typer.Argument(metavar="INPUT", help=_MESH, show_default=False)]
 MapFile = Annotated[
     Path,
     typer.Argument(
-        metavar="MAP", help="Map file: .npz with V, F or T, and image.", show_default=False
+        metavar="MAP",
+        help=_MAP,
+        show_default=False,
     ),
 ]
 Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.", show_default=False)]
@@ -40,6 +43,10 @@ Threads = Annotated[
     typer.Option(help="Threads to use; the result does not depend on it.", show_default=False),
 ]
 Compact = Annotated[bool, typer.Option("--compact", help="Drop points that no element uses.")]
+
+
+# Data of points and of cells, by name.
+Fields = tuple[dict[str, Any], dict[str, Any]]
 
 
 class Stopwatch:
@@ -70,6 +77,27 @@ def read_mesh(path: Path, orient: bool = False, compact: bool = False) -> TriMes
     return mesh
 
 
+def read_with_fields(path: Path, orient: bool, compact: bool) -> tuple[TriMesh | TetMesh, Fields]:
+    """As `read_mesh`, and the data of its points and cells."""
+    from .. import io
+    from ..mesh.meshes import TetMesh, TriMesh
+
+    arrays = io.read_arrays(path)
+    make = TriMesh if arrays.T is None else TetMesh
+    mesh: TriMesh | TetMesh = make(arrays.V, arrays.elements, orient=orient)
+    if mesh.n_turned:
+        _log.warning("%s: %d elements turned", path, mesh.n_turned)
+    points = arrays.point_data
+    if compact:
+        mesh, kept = mesh.compact()
+        points = {name: array[kept] for name, array in points.items()}
+    return mesh, (_numbers(points), _numbers(arrays.cell_data))
+
+
+def _numbers(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: a for k, a in data.items() if a.dtype.kind in "biuf" and a.ndim in (1, 2)}
+
+
 def surface_of(mesh: TriMesh | TetMesh) -> TriMesh:
     """A surface itself, of a solid its boundary."""
     from ..mesh.meshes import TetMesh
@@ -78,6 +106,17 @@ def surface_of(mesh: TriMesh | TetMesh) -> TriMesh:
         return mesh
     mesh.diagnose().require()
     return mesh.surface
+
+
+def surface_with_fields(mesh: TriMesh | TetMesh, fields: Fields) -> tuple[TriMesh, Fields]:
+    """`surface_of` with the data of its points; of a solid's tets its boundary has none."""
+    from ..mesh.meshes import TetMesh
+
+    surface = surface_of(mesh)
+    if not isinstance(mesh, TetMesh):
+        return surface, fields
+    ids = mesh.boundary_vertices
+    return surface, ({name: array[ids] for name, array in fields[0].items()}, {})
 
 
 def require_solid(mesh: TriMesh | TetMesh, path: Path, command: str) -> TetMesh:

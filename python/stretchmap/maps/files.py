@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
@@ -14,11 +15,15 @@ from ..base.options import as_path
 from ..base.torus import Torus
 from ..errors import FileFormatError, MeshError, OptionError
 from ..io.npz import read_archive
+from ..io.read_write import read_arrays
 from ..mesh.meshes import TetMesh, TriMesh
+from .fields import OF_MAPS, carried
 from .meta import read_history, read_meta
 from .result import MapResult
 
 __all__ = ["LoadedMap", "load_map"]
+
+_VIEWERS = (".vtu", ".vtk", ".xdmf")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -37,7 +42,7 @@ class LoadedMap(MapResult):
         All further arrays of the file.
     meta : dict
         The scalars stored with it; empty for a file of another program.
-    image, angles, history, converged, stop_reason, seconds
+    image, angles, history, converged, stop_reason, seconds, point_fields, cell_fields
         As in the result that was saved.
 
     Examples
@@ -77,7 +82,9 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     Parameters
     ----------
     path : path-like
-        An ``.npz`` with ``V (n, 3)``, ``F`` or ``T``, and ``image (n, 3)``.
+        An ``.npz`` with ``V (n, 3)``, ``F`` or ``T``, and ``image (n, 3)``; or ``.vtu``, ``.vtk``
+        or ``.xdmf`` with point data ``image`` and, where it is a map to a torus, ``torus``. Those
+        hold no history.
 
     Returns
     -------
@@ -86,7 +93,9 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     Raises
     ------
     FileFormatError
-        If the file is not such an ``.npz``.
+        If the file is none of these.
+    MissingDependencyError
+        If it is for viewers and meshio is not installed.
     MeshError
         If the mesh in it is invalid, or the image not finite.
     OSError
@@ -108,8 +117,9 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     (0, True)
     """
     path = as_path(path)
-    with open_to_read(path) as file, parsing(path):
-        arrays = read_archive(file)
+    viewer = path.suffix.lower() in _VIEWERS
+    arrays = _of_viewer(path) if viewer else _of_archive(path)
+    with parsing(path):
         if "V" in arrays and "image" not in arrays and ("F" in arrays or "T" in arrays):
             raise FileFormatError("it holds a mesh and no image of it: it has to be mapped first")
         if not {"V", "image"} <= arrays.keys() or ("F" in arrays) == ("T" in arrays):
@@ -127,6 +137,8 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
         if angles is not None:
             angles = arrays["angles"] = as_reals(angles, "angles", (len(V), 2))
         target = _target(arrays)
+        points, cells = _fields(arrays, "point:"), _fields(arrays, "cell:")
+        points, cells = carried(mesh, None, points, cells)
     return LoadedMap(
         mesh=mesh,
         image=image,
@@ -139,7 +151,39 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
         converged=meta.get("converged", False),
         stop_reason=meta.get("stop_reason", "read from a file"),
         seconds=meta.get("seconds", {}),
+        point_fields=points,
+        cell_fields=cells,
     )
+
+
+def _of_archive(path: Path) -> dict[str, NDArray[Any]]:
+    with open_to_read(path) as file, parsing(path):
+        return read_archive(file)
+
+
+def _of_viewer(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays of a map saved for viewers, as those of an archive."""
+    found = read_arrays(path)
+    arrays = {"V": found.V, "F" if found.T is None else "T": found.elements}
+    for data, prefix in ((found.point_data, "point:"), (found.cell_data, "cell:")):
+        for name, array in data.items():
+            if name in ("image", "parent_tet"):
+                arrays[name] = array
+            elif name == "angles" and array.ndim == 2:  # .vtk adds a column of zeros
+                arrays[name] = array[:, :2]
+            elif name == "torus":
+                if array.ndim != 2 or (array != array[0]).any():
+                    with parsing(path):
+                        raise FileFormatError("the radii of the torus differ from row to row")
+                arrays[name] = array[0, :2]
+            elif name not in OF_MAPS:
+                arrays[prefix + name] = array
+    return arrays
+
+
+def _fields(arrays: dict[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
+    names = [name for name in arrays if name.startswith(prefix)]
+    return {name[len(prefix) :]: arrays.pop(name) for name in names}
 
 
 def _target(arrays: dict[str, NDArray[Any]]) -> TetMesh | None:

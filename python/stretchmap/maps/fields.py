@@ -1,0 +1,93 @@
+"""Fields of the input carried along with a map: groups, materials, loads, measurements."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ArrayError
+from ..io.arrays import checked
+from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.refinement import Refinement
+
+__all__ = ["OF_MAPS", "carried"]
+
+_log = logging.getLogger("stretchmap")
+
+Fields = dict[str, NDArray[Any]]
+
+# What map files hold of their own, by name.
+OF_MAPS = frozenset(
+    "V F T image angles torus meta target_V target_T ratio ratios ring_ratio ring_ratios file "
+    "parent_tet landmarks forms u v s cos_u sin_u cos_v sin_v".split()
+)
+
+
+def carried(
+    mesh: TriMesh | TetMesh,
+    refinement: Refinement | None,
+    point_data: Mapping[str, ArrayLike] | None,
+    cell_data: Mapping[str, ArrayLike] | None,
+) -> tuple[Fields, Fields]:
+    """Fields of the mesh that was given as fields of the mesh that was mapped.
+
+    A tet has the values of the tet it is a part of, an added vertex the mean of its parents, or,
+    of whole numbers, which may be labels, the value of the first.
+
+    Raises
+    ------
+    ArrayError
+        Another number of rows than that of either mesh, or no numbers.
+    """
+    elements = mesh.T if isinstance(mesh, TetMesh) else mesh.F
+    n, m = len(mesh.V), len(elements)
+    n_given, m_given = n, m
+    if refinement is not None:
+        n_given, m_given = n - refinement.n_split, int(refinement.parent_tet[-1]) + 1
+    points = _own(checked(point_data, _rows(point_data, n, n_given), "point_data"))
+    cells = _own(checked(cell_data, _rows(cell_data, m, m_given), "cell_data"))
+    if refinement is not None:
+        first = _first_parents(refinement, n_given)
+        points = {
+            name: array
+            if len(array) == n
+            else refinement.prolong(array).astype(array.dtype)
+            if array.dtype.kind == "f"
+            else array[first]
+            for name, array in points.items()
+        }
+        cells = {k: a if len(a) == m else a[refinement.parent_tet] for k, a in cells.items()}
+    return points, cells
+
+
+def _own(fields: Fields) -> Fields:
+    """Without those whose names maps use themselves, and with names every archive takes."""
+    left_out = sorted(fields.keys() & OF_MAPS)
+    if left_out:
+        _log.info("fields of the input a map has itself are left out: %s", ", ".join(left_out))
+    return {k.replace("/", "_"): a for k, a in fields.items() if k not in OF_MAPS}
+
+
+def _rows(data: Mapping[str, ArrayLike] | None, own: int, given: int) -> int:
+    """Number of rows the fields must have: of the mesh that was mapped, if one has so many."""
+    if not isinstance(data, Mapping) or own == given:
+        return own
+    sizes = {len(np.atleast_1d(np.asarray(values))) for values in data.values()}
+    if len(sizes) > 1:
+        raise ArrayError(f"fields must all have {given} or all {own} rows, not {sorted(sizes)}")
+    return own if sizes == {own} else given
+
+
+def _first_parents(refinement: Refinement, n: int) -> NDArray[np.intp]:
+    """Vertex of the input each vertex is, or comes from."""
+    origin = np.arange(n)
+    origin = np.concatenate(
+        [origin, *(ids[:, 0] for ids in (refinement.parents, refinement.face_parents))]
+    )
+    for ids in refinement.halved:
+        origin = np.concatenate([origin, origin[ids[:, 0]]])
+    return origin

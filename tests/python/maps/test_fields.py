@@ -1,0 +1,126 @@
+"""Fields of the input go with a map into its files and its frames, and maps come back from files
+for viewers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shapes
+import stretchmap as sm
+from stretchmap.cli import main
+from stretchmap.errors import ArrayError, FileFormatError
+from stretchmap.io import read_arrays
+
+pytest.importorskip("meshio")
+
+VIEWERS = [".vtu", ".vtk", ".xdmf"]
+
+
+@pytest.fixture(scope="module")
+def coarse() -> sm.VolumeMap:
+    """Of a solid with interior edges that have to be split."""
+    result = sm.volume_map(sm.TetMesh(*shapes.cubes(shapes.RING)), keep_best=True)
+    assert result.refinement is not None and result.refinement.n_split > 0
+    return result
+
+
+def given(result: sm.VolumeMap) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    n = result.mesh.n_vertices - result.refinement.n_split
+    k = int(result.refinement.parent_tet[-1]) + 1
+    V = result.mesh.V[:n]
+    return (
+        {"height": V[:, 2], "label": np.arange(n), "load": 2.0 * V},
+        {"gmsh:physical": np.arange(k) % 3, "density": np.linspace(0.0, 1.0, k)},
+    )
+
+
+def test_added_vertices_and_tets_inherit(coarse):
+    points, cells = given(coarse)
+    carried = coarse.with_fields(points, cells)
+    np.testing.assert_allclose(carried.point_fields["load"], 2.0 * coarse.mesh.V, atol=1e-12)
+    np.testing.assert_array_equal(
+        carried.cell_fields["gmsh:physical"], coarse.refinement.parent_tet % 3
+    )
+    labels = carried.point_fields["label"]
+    assert labels.dtype.kind == "i"
+    ends = coarse.refinement.parents
+    n = len(points["label"])
+    np.testing.assert_array_equal(labels[n : n + len(ends)], ends[:, 0])
+    assert coarse.point_fields == {}
+
+
+@pytest.mark.parametrize("suffix", [".npz", *VIEWERS])
+def test_fields_come_back_from_files(suffix, coarse, tmp_path):
+    if suffix == ".xdmf":
+        pytest.importorskip("h5py")
+    carried = coarse.with_fields(*given(coarse))
+    path = tmp_path / f"map{suffix}"
+    carried.save(path)
+    loaded = sm.load_map(path)
+    exact = dict(rtol=0, atol=0) if suffix != ".xdmf" else dict(rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(loaded.image, coarse.image, **exact)
+    assert loaded.torus == coarse.torus
+    for ours, theirs in (
+        (carried.point_fields, loaded.point_fields),
+        (carried.cell_fields, loaded.cell_fields),
+    ):
+        assert set(ours) == set(theirs)
+        for name in ours:
+            np.testing.assert_allclose(theirs[name], ours[name], **exact)
+    np.testing.assert_array_equal(loaded.arrays["parent_tet"], coarse.refinement.parent_tet)
+    assert sm.certify_file(path).certified == coarse.certificate.certified
+    again = tmp_path / "again.vtu"
+    loaded.save(again)
+    assert set(read_arrays(again).point_data) == set(carried.as_cells().point_data)
+
+
+@pytest.mark.parametrize("suffix", VIEWERS[:2])
+def test_every_command_takes_maps_of_viewers(suffix, coarse, tmp_path):
+    path = tmp_path / f"map{suffix}"
+    coarse.save(path)
+    for command in (
+        ["certify", path],
+        ["coordinates", path, "-o", tmp_path / "c.csv"],
+        ["plot", path, "-o", tmp_path / "p.png"],
+        ["report", path, "-o", tmp_path / "r.html"],
+        ["morph", path, "-o", tmp_path / "m.pvd", "--frames", "3"],
+        ["partition", path, "-o", tmp_path / "parts.vtu", "--fractions", "2"],
+    ):
+        assert main([*map(str, command)]) in (0, 1), command
+    assert len(list(tmp_path.glob("m_*.vtu"))) == 3
+
+
+def test_the_command_carries_groups_into_map_and_frames(tmp_path):
+    solid = sm.TetMesh(*shapes.cubes(shapes.RING))
+    groups = np.arange(solid.n_tets) % 4
+    sm.write(
+        tmp_path / "in.vtu", solid, {"t": solid.V[:, 0]}, {"gmsh:physical": groups, "u": groups}
+    )
+    arguments = ["volume", str(tmp_path / "in.vtu"), "-o"]
+    for name in ("map.vtu", "map.npz"):
+        assert main([*arguments, str(tmp_path / name), "-q", "--keep-best", "--max-iter", "2"]) < 2
+    found = read_arrays(tmp_path / "map.vtu")
+    parent = found.cell_data.get("parent_tet", np.arange(len(found.T)))
+    np.testing.assert_array_equal(found.cell_data["gmsh:physical"], groups[parent])
+    np.testing.assert_array_equal(found.point_data["t"][: solid.n_vertices], solid.V[:, 0])
+    assert found.point_data["u"].dtype.kind == "f" and "u" not in found.cell_data
+    out = tmp_path / "frames.pvd"
+    assert main(["morph", str(tmp_path / "map.npz"), "-o", str(out), "--frames", "2"]) == 0
+    frame = read_arrays(tmp_path / "frames_001.vtu")
+    np.testing.assert_array_equal(frame.cell_data["gmsh:physical"], groups[parent])
+
+
+def test_fields_that_do_not_fit(coarse, tmp_path):
+    with pytest.raises(ArrayError, match="point_data"):
+        coarse.with_fields({"a": np.zeros(3)})
+    with pytest.raises(ArrayError, match="rows"):
+        coarse.with_fields(None, {"a": np.zeros(3), "b": np.zeros(4)})
+    solid = coarse.mesh
+    data = {"image": coarse.image, "torus": np.random.default_rng(0).random((len(solid.V), 2))}
+    sm.write(tmp_path / "a.vtu", solid, data)
+    with pytest.raises(FileFormatError, match="differ from row to row"):
+        sm.load_map(tmp_path / "a.vtu")
+    sm.write(tmp_path / "b.vtu", solid)
+    with pytest.raises(FileFormatError, match="has to be mapped first"):
+        sm.load_map(tmp_path / "b.vtu")
