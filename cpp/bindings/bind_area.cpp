@@ -44,12 +44,12 @@ void bind_sem(py::module_& m) {
 }
 
 void bind_chart_newton(py::module_& m) {
-  py::class_<ChartStep>(m, "ChartStep")
-      .def_readonly("before", &ChartStep::before)
-      .def_readonly("after", &ChartStep::after)
-      .def_readonly("step", &ChartStep::step)
-      .def_readonly("decrement", &ChartStep::decrement)
-      .def_readonly("within", &ChartStep::within);
+  py::class_<NewtonStep>(m, "GlideStep")
+      .def_readonly("before", &NewtonStep::before)
+      .def_readonly("after", &NewtonStep::after)
+      .def_readonly("step", &NewtonStep::step)
+      .def_readonly("decrement", &NewtonStep::decrement);
+  py::class_<ChartStep, NewtonStep>(m, "ChartStep").def_readonly("within", &ChartStep::within);
   py::class_<ChartNewton>(m, "ChartNewton")
       .def(py::init<SurfaceChart, SurfaceReference, double, Points2>(), py::arg("chart"),
            py::arg("reference"), py::arg("aspect"), py::arg("turns"), release_gil())
@@ -87,11 +87,6 @@ void bind_glide(py::module_& m) {
              return GlideProblem{chart, reference, ratio};
            }),
            py::arg("chart"), py::arg("reference"), py::arg("ratio"), release_gil());
-  py::class_<GlideStep>(m, "GlideStep")
-      .def_readonly("before", &GlideStep::before)
-      .def_readonly("after", &GlideStep::after)
-      .def_readonly("step", &GlideStep::step)
-      .def_readonly("decrement", &GlideStep::decrement);
   py::class_<SurfaceNewton>(m, "SurfaceNewton")
       .def(py::init<GlideProblem, Points2>(), py::arg("problem"), py::arg("angles"), release_gil())
       .def(
@@ -122,8 +117,8 @@ void bind(py::module_& m) {
   bind_chart(m);
   bind_sem(m);
   bind_quality(m);
-  bind_glide(m);
   bind_chart_newton(m);
+  bind_glide(m);
 }
 
 }  // namespace stretchmap::area

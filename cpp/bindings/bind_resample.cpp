@@ -69,7 +69,7 @@ void bind(py::module_& m) {
              double power) {
             Points gradient;
             linalg::BlockMatrix hessian = self.energy().pattern();
-            self.energy().linearize(x, {corner, power}, gradient, hessian);
+            self.energy().model(x, {corner, power}, gradient, hessian);
             return std::make_tuple(std::move(gradient), std::move(hessian.row_ptr),
                                    std::move(hessian.col), std::move(hessian.values));
           },

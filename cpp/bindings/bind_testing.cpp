@@ -167,7 +167,7 @@ void bind_volume(py::module_& m) {
           }
           batch.weight[l] = 1.0;
         }
-        volume::element_hessians(batch, w);
+        volume::element_models(batch, w);
         Eigen::Matrix3d P;
         Eigen::Matrix<double, 9, 9> H;
         for (int k = 0; k < 9; ++k) P.data()[k] = batch.gradient[k][0];
@@ -188,7 +188,7 @@ void bind_volume(py::module_& m) {
             {std::make_shared<volume::TorusSurface>(R, r), faces, rest, Vec::Ones(faces.rows())});
         Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
         Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
-        barrier.linearize(x, 0, epsilon, gradient, hessian);
+        barrier.model(x, 0, epsilon, gradient, hessian);
         return std::make_tuple(barrier.value(x, 0, epsilon).energy, gradient, hessian);
       },
       py::arg("x").noconvert(), py::arg("faces").noconvert(), py::arg("rest").noconvert(),

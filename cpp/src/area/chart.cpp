@@ -51,6 +51,14 @@ Vec turn_areas(const SurfaceChart& chart, const Points2Ref& turns) {
   return areas;
 }
 
+std::vector<Index> folded_faces(const SurfaceChart& chart, const Points2Ref& turns) {
+  const Vec areas = turn_areas(chart, turns);
+  std::vector<Index> faces;
+  for (Index f = 0; f < areas.size(); ++f)
+    if (!(areas(f) > 0.0)) faces.push_back(f);
+  return faces;
+}
+
 double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,
                      const Points2Ref& direction, double share, double longest) {
   for (Index f = 0; f < chart.faces.rows(); ++f) {

@@ -4,16 +4,15 @@
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/linalg/backtrack.hpp"
 
 namespace stretchmap::area {
 
 namespace {
 
 using Eigen::Matrix2d;
-using Eigen::Vector2d;
 
-constexpr double kArmijo = 1e-4;
-constexpr int kHalvings = 30;
+constexpr int kTries = 30;
 constexpr double kRidge = 1e-12;  // of the mean diagonal: holds the two translations
 
 // Inverse edge matrices of triangles given by their areas and cotangents.
@@ -29,14 +28,6 @@ Rows rest_of(const SurfaceReference& reference) {
   return rest;
 }
 
-std::vector<Index> folded(const SurfaceChart& chart, const Points2& turns) {
-  const Vec areas = turn_areas(chart, turns);
-  std::vector<Index> faces;
-  for (Index f = 0; f < areas.size(); ++f)
-    if (!(areas(f) > 0.0)) faces.push_back(f);
-  return faces;
-}
-
 }  // namespace
 
 ChartNewton::ChartNewton(SurfaceChart chart, SurfaceReference reference, double aspect,
@@ -46,8 +37,8 @@ ChartNewton::ChartNewton(SurfaceChart chart, SurfaceReference reference, double 
       periods_(std::sqrt(aspect), 1.0 / std::sqrt(aspect)),
       turns_(std::move(turns)),
       rest_(rest_of(reference_)),
-      pattern_(chart_.faces, chart_.n_vertices, 2) {
-  const std::vector<Index> faces = folded(chart_, turns_);
+      system_(chart_.faces, chart_.n_vertices, kRidge) {
+  const std::vector<Index> faces = folded_faces(chart_, turns_);
   if (!faces.empty())
     throw Error("SolverError", "faces are folded in the chart; Newton steps need a start without",
                 faces);
@@ -68,18 +59,15 @@ Matrix2d ChartNewton::rest(const Targets& targets, Index f) const {
 }
 
 Matrix2d ChartNewton::jacobian(const Points2& turns, const Targets& targets, Index f) const {
-  const Vector2d origin = chart_.corner(turns, f, 0);
-  Matrix2d edges;
-  edges << chart_.corner(turns, f, 1) - origin, chart_.corner(turns, f, 2) - origin;
-  return periods_.asDiagonal() * edges * rest(targets, f);
+  return periods_.asDiagonal() * chart_.edges(turns, f) * rest(targets, f);
 }
 
-double ChartNewton::energy(const Points2& turns, const TriangleWeights& weights,
-                           const Targets& targets) const {
+double ChartNewton::value(const Points2& turns, const TriangleWeights& weights,
+                          const Targets& targets) const {
   Vec values(targets.areas.size());
 #pragma omp parallel for schedule(static)
   for (Index f = 0; f < static_cast<Index>(values.size()); ++f)
-    values(f) = targets.weights(f) * triangle_energy(jacobian(turns, targets, f), weights);
+    values(f) = targets.weights(f) * triangle_value(jacobian(turns, targets, f), weights);
   return values.sum();
 }
 
@@ -94,7 +82,7 @@ ChartStep ChartNewton::step(const TriangleWeights& weights, double reach, const 
   for (Index f = 0; f < m; ++f) {
     Matrix2d stress;
     Matrix4 curvature;
-    triangle_energy(jacobian(turns_, goal, f), stress, curvature, weights);
+    triangle_model(jacobian(turns_, goal, f), stress, curvature, weights);
     Eigen::Matrix<double, 3, 2> G;
     G.bottomRows<2>() = rest(goal, f);
     G.row(0) = -(G.row(1) + G.row(2));
@@ -106,33 +94,25 @@ ChartStep ChartNewton::step(const TriangleWeights& weights, double reach, const 
     Eigen::Map<Eigen::Matrix<double, 6, 6>>(hessians.row(f).data()) =
         goal.weights(f) * D.transpose() * curvature * D;
   }
-  Vec gradient = Vec::Zero(turns_.size());
-  for (Index f = 0; f < m; ++f)
-    for (int k = 0; k < 3; ++k)
-      gradient.segment<2>(2 * chart_.faces(f, k)) += gradients.row(f).segment<2>(2 * k).transpose();
-  SparseMatrix matrix = pattern_.zeros();
-  pattern_.scatter(hessians, matrix.valuePtr());
-  const double ridge = kRidge * Vec(matrix.diagonal()).mean();
-  for (Index i = 0; i < matrix.rows(); ++i) matrix.coeffRef(i, i) += ridge;
-  if (poll) poll();
-  if (!solver_) solver_.emplace(matrix);
-  solver_->factorize(matrix, poll);
-  const Vec solution = solver_->solve(-gradient);
+  const Vec gradient = sum_corners(chart_.faces, chart_.n_vertices, gradients);
+  const Vec solution = system_.solve(hessians, gradient, poll);
   Points2 direction = Eigen::Map<const Points2>(solution.data(), chart_.n_vertices, 2);
   direction.rowwise() -= direction.colwise().mean();  // translations cost nothing
 
   const double slope = gradient.dot(solution);
-  result.before = result.after = energy(turns_, weights, goal);
+  result.before = result.after = value(turns_, weights, goal);
   result.decrement = -slope;
-  double t = unfolded_step(chart_, turns_, direction, 0.9, 1.0);
-  for (int halving = 0; halving < kHalvings; ++halving, t *= 0.5) {
-    const Points2 trial = turns_ + t * direction;
-    const double value = energy(trial, weights, goal);
-    if (!(value <= result.before + kArmijo * t * slope)) continue;
-    turns_ = trial;
-    result.after = value;
-    result.step = t;
-    break;
+  Points2 trial;
+  double there = result.before;
+  result.step =
+      linalg::backtrack(result.before, slope, unfolded_step(chart_, turns_, direction, 0.9, 1.0),
+                        kTries, [&](double t) {
+                          trial = turns_ + t * direction;
+                          return there = value(trial, weights, goal);
+                        });
+  if (result.step > 0.0) {
+    turns_ = std::move(trial);
+    result.after = there;
   }
   return result;
 }

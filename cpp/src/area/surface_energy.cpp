@@ -7,6 +7,7 @@
 
 #include "area/face_jet.hpp"
 #include "area/facing.hpp"
+#include "stretchmap/area/surface_pattern.hpp"
 
 namespace stretchmap::area {
 
@@ -15,10 +16,6 @@ namespace {
 // A quarter of the areas' own curvature in the model: with all of it the last per cent of the area
 // ratios takes ever more steps, with none of it the steps get short.
 constexpr double kModelCurvature = 0.25;
-
-bool needs_hessian(Derivatives derivatives) {
-  return derivatives == Derivatives::kHessian || derivatives == Derivatives::kModel;
-}
 
 // Sum of half the cotangent times the squared opposite edge: |t| (s1^2 + s2^2).
 Jet dirichlet_jet(const TorusPoint (&p)[3], const Eigen::Vector3d& cotan, bool second) {
@@ -129,7 +126,7 @@ void make_convex(SixSix& matrix) {
 Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                 const std::vector<TorusPoint>& points, const Points2Ref& angles, Index f,
                 Derivatives derivatives) {
-  const bool second = needs_hessian(derivatives);
+  const bool second = derivatives != Derivatives::kNone;
   const double curvature = derivatives == Derivatives::kModel ? kModelCurvature : 1.0;
   TorusPoint p[3];
   Eigen::Vector2d angle[3];
@@ -171,29 +168,24 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
 GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                          const Points2Ref& angles, Derivatives derivatives) {
   const Index m = static_cast<Index>(problem.chart.faces.rows());
-  const bool second = needs_hessian(derivatives);
+  const bool second = derivatives != Derivatives::kNone;
   const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Vec values(m);
-  Rows gradients(derivatives == Derivatives::kNone ? 0 : m, 6);
+  Rows gradients(second ? m : 0, 6);
   GlideEnergy energy;
   if (second) energy.hessians.resize(m, 36);
 #pragma omp parallel for schedule(static)
   for (Index f = 0; f < m; ++f) {
     Jet jet = face_energy(problem, weights, scale, points, angles, f, derivatives);
     values(f) = jet.value;
-    if (gradients.rows() > 0) gradients.row(f) = jet.gradient;
     if (!second) continue;
+    gradients.row(f) = jet.gradient;
     if (derivatives == Derivatives::kModel) make_convex(jet.hessian);
     Eigen::Map<SixSix>(energy.hessians.row(f).data()) = jet.hessian;
   }
   energy.value = values.sum();
-  if (gradients.rows() > 0) {
-    energy.gradient = Vec::Zero(angles.size());
-    for (Index f = 0; f < m; ++f)
-      for (int k = 0; k < 3; ++k)
-        energy.gradient.segment<2>(2 * problem.chart.faces(f, k)) +=
-            gradients.row(f).segment<2>(2 * k).transpose();
-  }
+  if (second)
+    energy.gradient = sum_corners(problem.chart.faces, problem.chart.n_vertices, gradients);
   return energy;
 }
 

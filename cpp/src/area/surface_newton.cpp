@@ -8,17 +8,17 @@
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/torus.hpp"
 #include "stretchmap/certificate/torus_graph.hpp"
+#include "stretchmap/linalg/backtrack.hpp"
 
 namespace stretchmap::area {
 
 namespace {
 
-constexpr double kArmijo = 1e-4;
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
 constexpr int kBestSteps = 2;        // towards it, of each kind
 constexpr int kStiffSteps = 6;
 constexpr double kGain = 1e-2;  // of a step after which its factor serves again
-constexpr int kHalvings = 30;
+constexpr int kTries = 30;
 constexpr double kRidge = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
 Points2 as_rows(const Vec& vector) {
@@ -31,57 +31,41 @@ Points2 without_rotation(Points2 direction) {
   return direction;
 }
 
-std::vector<Index> flipped(const GlideProblem& problem, const Points2& angles) {
-  const Vec areas = turn_areas(problem.chart, angles / kTwoPi);
-  std::vector<Index> faces;
-  for (Index f = 0; f < areas.size(); ++f)
-    if (!(areas(f) > 0.0)) faces.push_back(f);
-  return faces;
-}
-
 }  // namespace
 
 SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
     : problem_(std::move(problem)),
       angles_(std::move(angles)),
-      pattern_(problem_.chart.faces, problem_.chart.n_vertices, 2) {
-  const std::vector<Index> faces = flipped(problem_, angles_);
+      system_(problem_.chart.faces, problem_.chart.n_vertices, kRidge) {
+  const std::vector<Index> faces = folded_faces(problem_.chart, angles_ / kTwoPi);
   if (!faces.empty())
     throw Error("SolverError", "faces are flipped in the chart; Newton steps need a start without",
                 faces);
 }
 
-GlideStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
+NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
   const double scale = best_scale(problem_, angles_);
   const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
-  if (poll) poll();
-  factorize(here.hessians, poll);
-  const Vec flat = solver_->solve(-here.gradient);
+  const Vec flat = system_.solve(here.hessians, here.gradient, poll);
   const Points2 direction = without_rotation(as_rows(flat));
 
   const double slope = here.gradient.dot(flat);
-  GlideStep result{here.value, here.value, 0.0, -slope};
-  double t = longest_step(direction);
-  for (int halving = 0; halving < kHalvings; ++halving, t *= 0.5) {
-    if (poll) poll();
-    const Points2 trial = angles_ + t * direction;
-    const double value = glide_energy(problem_, weights, scale, trial, Derivatives::kNone).value;
-    if (!(value <= here.value + kArmijo * t * slope) || !flipped(problem_, trial).empty()) continue;
-    angles_ = trial;
-    result.after = value;
-    result.step = t;
-    break;
+  NewtonStep result{here.value, here.value, 0.0, -slope};
+  Points2 trial;
+  double there = here.value;
+  result.step =
+      linalg::backtrack(here.value, slope, longest_step(direction), kTries, [&](double t) {
+        if (poll) poll();
+        trial = angles_ + t * direction;
+        there = glide_energy(problem_, weights, scale, trial, Derivatives::kNone).value;
+        const bool sound = folded_faces(problem_.chart, trial / kTwoPi).empty();
+        return sound ? there : std::numeric_limits<double>::infinity();
+      });
+  if (result.step > 0.0) {
+    angles_ = std::move(trial);
+    result.after = there;
   }
   return result;
-}
-
-void SurfaceNewton::factorize(const Rows& hessians, const Poll& poll) {
-  SparseMatrix matrix = pattern_.zeros();
-  pattern_.scatter(hessians, matrix.valuePtr());
-  const double ridge = kRidge * Vec(matrix.diagonal()).mean();
-  for (Index i = 0; i < matrix.rows(); ++i) matrix.coeffRef(i, i) += ridge;
-  if (!solver_) solver_.emplace(matrix);
-  solver_->factorize(matrix, poll);
 }
 
 // At most 1, and at most nine tenths of the way to the first face of no area in the (u, v) chart.

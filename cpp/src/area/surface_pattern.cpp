@@ -60,4 +60,12 @@ void SurfacePattern::scatter(const RowsRef& elements, double* values) const {
   for (const Index slot : slot_) values[slot] += *entry++;
 }
 
+Vec sum_corners(const FacesRef& faces, Index n_vertices, const Rows& gradients) {
+  Vec sum = Vec::Zero(2 * n_vertices);
+  for (Index f = 0; f < faces.rows(); ++f)
+    for (int k = 0; k < 3; ++k)
+      sum.segment<2>(2 * faces(f, k)) += gradients.row(f).segment<2>(2 * k).transpose();
+  return sum;
+}
+
 }  // namespace stretchmap::area

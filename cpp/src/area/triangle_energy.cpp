@@ -5,15 +5,15 @@
 
 namespace stretchmap::area {
 
-double triangle_energy(const Eigen::Matrix2d& K, const TriangleWeights& weights) {
+double triangle_value(const Eigen::Matrix2d& K, const TriangleWeights& weights) {
   const double D = K.determinant();
   if (!(D > 0.0)) return std::numeric_limits<double>::infinity();
   return weights.shape * (0.5 * K.squaredNorm() / D - 1.0) +
          weights.area * ((D - 1.0) * (D - 1.0) / D);
 }
 
-double triangle_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H,
-                       const TriangleWeights& weights) {
+void triangle_model(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H,
+                    const TriangleWeights& weights) {
   using Eigen::Matrix2d;
   using Eigen::Vector2d;
   const double D = K.determinant(), I = K.squaredNorm();
@@ -54,7 +54,6 @@ double triangle_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H,
   flip << 0.0, 1.0, 1.0, 0.0;
   add(2.0 * a + slope, std::sqrt(0.5) * twist);
   add(2.0 * a - slope, std::sqrt(0.5) * flip);
-  return triangle_energy(K, weights);
 }
 
 }  // namespace stretchmap::area

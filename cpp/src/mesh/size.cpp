@@ -35,6 +35,15 @@ Points face_area_vectors(const PointsRef& points, const FacesRef& faces) {
   return vectors;
 }
 
+Eigen::Matrix2d plane_edges(const PointsRef& points, const FacesRef& faces, Index f) {
+  const Eigen::RowVector3d a = points.row(faces(f, 1)) - points.row(faces(f, 0));
+  const Eigen::RowVector3d b = points.row(faces(f, 2)) - points.row(faces(f, 0));
+  const double base = a.norm();
+  Eigen::Matrix2d edges;
+  edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
+  return edges;
+}
+
 Vec face_areas(const PointsRef& points, const FacesRef& faces) {
   return face_area_vectors(points, faces).rowwise().norm();
 }

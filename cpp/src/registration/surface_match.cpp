@@ -1,29 +1,14 @@
 #include "stretchmap/registration/surface_match.hpp"
 
+#include <cmath>
 #include <limits>
 #include <vector>
 
 #include "stretchmap/area/triangle_energy.hpp"
+#include "stretchmap/mesh/size.hpp"
 
 namespace stretchmap::registration {
 namespace {
-
-Eigen::Matrix2d chart_edges(const area::SurfaceChart& chart, const Points2Ref& y, Index f) {
-  const Eigen::Vector2d origin = chart.corner(y, f, 0);
-  Eigen::Matrix2d edges;
-  edges << chart.corner(y, f, 1) - origin, chart.corner(y, f, 2) - origin;
-  return edges;
-}
-
-// Edges of the image triangle in its own plane, the first along x.
-Eigen::Matrix2d plane_edges(const area::SurfaceChart& chart, const PointsRef& X, Index f) {
-  const Eigen::RowVector3d a = X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0));
-  const Eigen::RowVector3d b = X.row(chart.faces(f, 2)) - X.row(chart.faces(f, 0));
-  const double base = a.norm();
-  Eigen::Matrix2d edges;
-  edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
-  return edges;
-}
 
 Eigen::Matrix2d rest_of(const RowsRef& rest, Index f) {
   Eigen::Matrix2d matrix;
@@ -43,7 +28,7 @@ FaceModel face_model(const Eigen::Matrix2d& P, const Eigen::Matrix2d& R,
                      const SlopeOfCorner& slope) {
   Eigen::Matrix2d stress;
   area::Matrix4 curvature;
-  area::triangle_energy(P * R, stress, curvature);
+  area::triangle_model(P * R, stress, curvature);
   Eigen::Matrix<double, 3, 2> G;
   G << 0.0, 0.0, R(0, 0), R(0, 1), R(1, 0), R(1, 1);
   G.row(0) = -(G.row(1) + G.row(2));
@@ -79,12 +64,18 @@ MatchModel assemble(const area::SurfaceChart& chart, const VecRef& weights,
 }  // namespace
 
 double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                   const RowsRef& rest, Index f) {
+  if (!(chart.edges(y, f).determinant() > 0.0)) return std::numeric_limits<double>::infinity();
+  return area::triangle_value(mesh::plane_edges(X, chart.faces, f) * rest_of(rest, f));
+}
+
+double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
                    const RowsRef& rest, const VecRef& weights) {
   double total = 0.0;
   for (Index f = 0; f < chart.faces.rows(); ++f) {
-    if (!(chart_edges(chart, y, f).determinant() > 0.0))
-      return std::numeric_limits<double>::infinity();
-    total += weights[f] * area::triangle_energy(plane_edges(chart, X, f) * rest_of(rest, f));
+    const double value = match_value(chart, y, X, rest, f);
+    if (!std::isfinite(value)) return value;
+    total += weights[f] * value;
   }
   return total;
 }
@@ -92,9 +83,9 @@ double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const P
 MatchModel match_model(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
                        const RowsRef& slopes, const RowsRef& rest, const VecRef& weights) {
   return assemble(chart, weights, [&](Index f) {
-    const Eigen::Matrix2d P = plane_edges(chart, X, f), R = rest_of(rest, f);
+    const Eigen::Matrix2d P = mesh::plane_edges(X, chart.faces, f), R = rest_of(rest, f);
     if (slopes.rows() == 0) {
-      const Eigen::Matrix2d S = P * chart_edges(chart, y, f).inverse();
+      const Eigen::Matrix2d S = P * chart.edges(y, f).inverse();
       return face_model(P, R, [&](int) { return S; });
     }
     const Eigen::Vector3d a = (X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0))).transpose();
@@ -115,15 +106,14 @@ double flat_value(const area::SurfaceChart& chart, const Points2Ref& y,
                   const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights) {
   double total = 0.0;
   for (Index f = 0; f < chart.faces.rows(); ++f)
-    total +=
-        weights[f] * area::triangle_energy(lattice * chart_edges(chart, y, f) * rest_of(rest, f));
+    total += weights[f] * area::triangle_value(lattice * chart.edges(y, f) * rest_of(rest, f));
   return total;
 }
 
 MatchModel flat_model(const area::SurfaceChart& chart, const Points2Ref& y,
                       const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights) {
   return assemble(chart, weights, [&](Index f) {
-    const Eigen::Matrix2d P = lattice * chart_edges(chart, y, f);
+    const Eigen::Matrix2d P = lattice * chart.edges(y, f);
     return face_model(P, rest_of(rest, f), [&](int) { return lattice; });
   });
 }

@@ -3,29 +3,14 @@
 #include <cmath>
 #include <limits>
 
-#include "stretchmap/area/triangle_energy.hpp"
 #include "stretchmap/base/incidence.hpp"
 #include "stretchmap/base/torus.hpp"
+#include "stretchmap/registration/surface_match.hpp"
 
 namespace stretchmap::registration {
 namespace {
 
 constexpr int kDirections = 8;
-
-double face_value(const area::SurfaceChart& chart, const Points2& y, const Points& X,
-                  const RowsRef& rest, Index f) {
-  const Eigen::Vector2d origin = chart.corner(y, f, 0);
-  Eigen::Matrix2d flat;
-  flat << chart.corner(y, f, 1) - origin, chart.corner(y, f, 2) - origin;
-  if (!(flat.determinant() > 0.0)) return std::numeric_limits<double>::infinity();
-  const Eigen::RowVector3d a = X.row(chart.faces(f, 1)) - X.row(chart.faces(f, 0));
-  const Eigen::RowVector3d b = X.row(chart.faces(f, 2)) - X.row(chart.faces(f, 0));
-  const double base = a.norm();
-  Eigen::Matrix2d edges, rest_edges;
-  edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
-  rest_edges << rest(f, 0), rest(f, 1), rest(f, 2), rest(f, 3);
-  return area::triangle_energy(edges * rest_edges);
-}
 
 class Search {
  public:
@@ -68,7 +53,7 @@ class Search {
     double total = 0.0;
     for (const Index corner : corners_[i]) {
       const Index f = corner / 3;
-      total += weights_[f] * face_value(chart_, y_, X_, rest_, f);
+      total += weights_[f] * match_value(chart_, y_, X_, rest_, f);
       if (!std::isfinite(total)) return std::numeric_limits<double>::infinity();
     }
     return total;

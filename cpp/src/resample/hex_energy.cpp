@@ -29,21 +29,6 @@ std::array<std::array<bool, 8>, 8> coupled_corners() {
   return out;
 }
 
-// Blocks of the tet at corner c; rows and columns of its first point are minus the others' sums.
-void tet_blocks(const ElementBatch& batch, int c, double slope, RowMatrix3d (&H)[4][4]) {
-  int at = 0;
-  for (int a = 1; a < 4; ++a)
-    for (int b = a; b < 4; ++b, ++at) {
-      for (int i = 0; i < 9; ++i) H[a][b](i / 3, i % 3) = slope * batch.block[at][i][c];
-      if (b > a) H[b][a] = H[a][b].transpose();
-    }
-  for (int a = 1; a < 4; ++a) {
-    H[a][0] = -(H[a][1] + H[a][2] + H[a][3]);
-    H[0][a] = H[a][0].transpose();
-  }
-  H[0][0] = -(H[0][1] + H[0][2] + H[0][3]);
-}
-
 }  // namespace
 
 HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
@@ -160,8 +145,8 @@ void HexEnergy::add(const ElementBatch& batch, double power, Index h, Index firs
       for (int i = 0; i < 3; ++i) g[a + 1][i] = batch.gradient[3 * a + i][c];
       g[0] -= g[a + 1];
     }
-    RowMatrix3d H[4][4];
-    tet_blocks(batch, c, slope, H);
+    volume::Block3 H[4][4];
+    volume::tet_blocks(batch, c, slope, H);
     for (int a = 0; a < 4; ++a) {
       const int corner = kCorners[c][a];
       const Index row = hexes_(h, corner);
@@ -176,8 +161,8 @@ void HexEnergy::add(const ElementBatch& batch, double power, Index h, Index firs
   }
 }
 
-void HexEnergy::linearize(const PointsRef& x, const HexWeights& w, Points& gradient,
-                          linalg::BlockMatrix& hessian) const {
+void HexEnergy::model(const PointsRef& x, const HexWeights& w, Points& gradient,
+                      linalg::BlockMatrix& hessian) const {
   gradient.setZero(n_, 3);
   hessian.values.setZero();
   double* blocks = hessian.values.data();
@@ -185,7 +170,7 @@ void HexEnergy::linearize(const PointsRef& x, const HexWeights& w, Points& gradi
     ElementBatch batch;
     for (const Index h : part_hexes_[begin / kChunk]) {
       load(x, h, batch);
-      element_hessians(batch, w.corner);
+      element_models(batch, w.corner);
       add(batch, w.power, h, begin, end, gradient, blocks);
     }
   });

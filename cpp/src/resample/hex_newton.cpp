@@ -3,12 +3,12 @@
 #include <cmath>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/linalg/backtrack.hpp"
 
 namespace stretchmap::resample {
 namespace {
 
-constexpr int kMostHalvings = 20;
-constexpr double kArmijo = 1e-4;  // demanded share of the predicted decrease
+constexpr int kTries = 21;
 
 }  // namespace
 
@@ -18,10 +18,10 @@ bool HexNewton::step(Points& x, const HexWeights& w, const HexNewtonOptions& opt
   Points gradient;
   if (!solver_) {
     linalg::BlockMatrix hessian = energy_.pattern();
-    energy_.linearize(x, w, gradient, hessian);
+    energy_.model(x, w, gradient, hessian);
     solver_ = std::make_unique<linalg::BlockSolver>(std::move(hessian));
   } else {
-    energy_.linearize(x, w, gradient, solver_->matrix());
+    energy_.model(x, w, gradient, solver_->matrix());
     solver_->refactor();
   }
   linalg::SolveOptions solve;
@@ -32,16 +32,17 @@ bool HexNewton::step(Points& x, const HexWeights& w, const HexNewtonOptions& opt
   report.cg_iterations += solver_->solve(-gradient, direction, solve, poll).iterations;
   const double decrement = -(gradient.array() * direction.array()).sum();
   if (!(decrement > 0.0)) return false;
-  double alpha = 1.0;
-  for (int k = 0; k <= kMostHalvings; ++k, alpha *= 0.5) {
-    Points trial = x + alpha * direction;
-    const HexReport there = energy_.value(trial, w);
-    if (!(there.energy <= report.after.energy - kArmijo * alpha * decrement)) continue;
-    x = std::move(trial);
-    report.after = there;
-    return true;
-  }
-  return false;
+  Points trial;
+  HexReport there;
+  const auto energy = [&](double alpha) {
+    trial = x + alpha * direction;
+    there = energy_.value(trial, w);
+    return there.energy;
+  };
+  if (linalg::backtrack(report.after.energy, -decrement, 1.0, kTries, energy) == 0.0) return false;
+  x = std::move(trial);
+  report.after = there;
+  return true;
 }
 
 HexNewtonReport HexNewton::run(Points& x, const HexWeights& w, const HexNewtonOptions& options,

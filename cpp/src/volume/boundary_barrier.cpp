@@ -53,9 +53,9 @@ FaceReport BoundaryBarrier::value(const PointsRef& x, Index f, double epsilon) c
   return report;
 }
 
-void BoundaryBarrier::linearize(const PointsRef& x, Index f, double epsilon,
-                                Eigen::Matrix<double, 6, 1>& gradient,
-                                Eigen::Matrix<double, 6, 6>& hessian) const {
+void BoundaryBarrier::model(const PointsRef& x, Index f, double epsilon,
+                            Eigen::Matrix<double, 6, 1>& gradient,
+                            Eigen::Matrix<double, 6, 6>& hessian) const {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   const State s = state(x, f);
@@ -102,11 +102,7 @@ Rows rest_triangles(const PointsRef& V, const FacesRef& faces, double scale, dou
   const Eigen::Matrix2d regular_inverse = regular.inverse();
   Rows rest(m, 4);
   for (Index f = 0; f < m; ++f) {
-    const Eigen::RowVector3d a = V.row(faces(f, 1)) - V.row(faces(f, 0));
-    const Eigen::RowVector3d b = V.row(faces(f, 2)) - V.row(faces(f, 0));
-    const double base = a.norm();
-    Eigen::Matrix2d edges;
-    edges << base, a.dot(b) / base, 0.0, a.cross(b).norm() / base;
+    Eigen::Matrix2d edges = mesh::plane_edges(V, faces, f);
     const Eigen::JacobiSVD<Eigen::Matrix2d> svd(edges * regular_inverse,
                                                 Eigen::ComputeFullU | Eigen::ComputeFullV);
     const Eigen::Vector2d sigma = svd.singularValues();

@@ -204,7 +204,7 @@ void element_gradients(ElementBatch& batch, const EnergyWeights& w) {
 }
 
 STRETCHMAP_CLONES
-void element_hessians(ElementBatch& batch, const EnergyWeights& w) {
+void element_models(ElementBatch& batch, const EnergyWeights& w) {
   Jacobians j;
   Terms t;
   jacobians(batch, j);

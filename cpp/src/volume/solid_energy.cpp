@@ -11,8 +11,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::RowVector3d;
 using Eigen::Vector3d;
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-using Block = Eigen::Map<RowMatrix3d>;
+using Block = Eigen::Map<Block3>;
 
 // What is taken of the way to where a tet turns over, and so how far ahead that has to be looked
 // for.
@@ -30,7 +29,7 @@ double blocked_sum(const Vec& values) {
 }
 
 // to += block, two numbers at a time.
-void add_block(const RowMatrix3d& block, double* to) {
+void add_block(const Block3& block, double* to) {
   using Eight = Eigen::Array<double, 8, 1>;
   Eigen::Map<Eight> head(to);
   head += Eigen::Map<const Eight>(block.data());
@@ -138,21 +137,8 @@ void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Inde
   if (row[0] >= 0) gradient.row(row[0]) -= others;
   if (!blocks) return;
 
-  // Rows and columns of the first vertex are minus the sums of the others'.
-  std::array<std::array<RowMatrix3d, 4>, 4> H;
-  int at = 0;
-  for (int a = 1; a < 4; ++a) {
-    for (int b = a; b < 4; ++b, ++at) {
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) H[a][b](i, j) = batch.block[at][3 * i + j][lane];
-      if (b > a) H[b][a] = H[a][b].transpose();
-    }
-  }
-  for (int a = 1; a < 4; ++a) {
-    H[a][0] = -(H[a][1] + H[a][2] + H[a][3]);
-    H[0][a] = H[a][0].transpose();
-  }
-  H[0][0] = -(H[0][1] + H[0][2] + H[0][3]);
+  Block3 H[4][4];
+  tet_blocks(batch, lane, 1.0, H);
   for (int a = 0; a < 4; ++a) {
     if (row[a] < 0) continue;
     for (int b = 0; b < 4; ++b)
@@ -161,8 +147,8 @@ void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Inde
   }
 }
 
-void SolidEnergy::linearize(const PointsRef& x, const EnergyWeights& w, Points& gradient,
-                            linalg::BlockMatrix* hessian) const {
+void SolidEnergy::model(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+                        linalg::BlockMatrix* hessian) const {
   gradient.setZero(rows(), 3);
   double* blocks = nullptr;
   if (hessian) {
@@ -174,7 +160,7 @@ void SolidEnergy::linearize(const PointsRef& x, const EnergyWeights& w, Points& 
   for (Index p = 0; p < parts; ++p) {
     const std::vector<Index>& list = part_tets_[p];
     for_batches(
-        x, w, 0, static_cast<Index>(list.size()), blocks ? element_hessians : element_gradients,
+        x, w, 0, static_cast<Index>(list.size()), blocks ? element_models : element_gradients,
         [&](Index position) { return list[position]; },
         [&](Index t, int lane, const ElementBatch& batch) {
           add_element(batch, lane, t, part_row_[p], part_row_[p + 1], gradient, blocks);
@@ -197,7 +183,7 @@ void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, 
                            Index last, Points& gradient, double* blocks) const {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-  barrier_.linearize(x, f, w.epsilon, g, H);
+  barrier_.model(x, f, w.epsilon, g, H);
   for (int a = 0; a < 3; ++a) {
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/linalg/backtrack.hpp"
 
 namespace stretchmap::volume {
 namespace {
@@ -14,6 +15,7 @@ using Block = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
 constexpr double kShifts[] = {0.0, 1e-8, 1e-4, 1e-1, 10.0};
 constexpr double kRounding = 1e-12;   // a predicted decrease that is no more of the energy is none
 constexpr double kEnergyShare = 0.2;  // see SolveOptions
+constexpr int kTries = 21;            // of the line search
 constexpr double kHeldUp = 0.5;       // a shorter step is worth a look at who holds it up
 
 // Adds a share of its mean to the diagonal of every diagonal block.
@@ -64,12 +66,12 @@ bool SolidNewton::linearize(const PointsRef& x, const EnergyWeights& w) {
   for (const double shift : kShifts) {
     try {
       if (solver_) {
-        energy_.linearize(x, w, gradient_, &solver_->matrix());
+        energy_.model(x, w, gradient_, &solver_->matrix());
         stiffen(solver_->matrix(), shift);
         solver_->refactor();
       } else {
         BlockMatrix hessian = energy_.pattern();
-        energy_.linearize(x, w, gradient_, &hessian);
+        energy_.model(x, w, gradient_, &hessian);
         stiffen(hessian, shift);
         solver_ =
             std::make_unique<linalg::BlockSolver>(std::move(hessian), energy_.near_nullspace(x));
@@ -86,7 +88,7 @@ bool SolidNewton::linearize(const PointsRef& x, const EnergyWeights& w) {
 bool SolidNewton::renew(const PointsRef& x, const EnergyWeights& w, bool keep) {
   keep = keep && solver_ && last_step_.size() > 0;
   if (keep) {
-    energy_.linearize(x, w, gradient_, nullptr);
+    energy_.model(x, w, gradient_, nullptr);
   } else {
     changes_.clear();
     if (!linearize(x, w)) return false;
@@ -138,19 +140,23 @@ bool SolidNewton::descend(const NewtonOptions& options, const Poll& poll, Points
 }
 
 bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights& w,
-                         const NewtonOptions& options, NewtonReport& report) {
+                         NewtonReport& report) {
   const Points start = x;
   Points taken = direction;
-  double alpha = w.epsilon > 0.0 ? 1.0 : energy_.longest_step(x, direction);
-  for (int k = 0; k <= options.max_halvings && report.alpha == 0.0; ++k, alpha *= 0.5) {
-    Points trial = energy_.move(start, direction, alpha);
-    const EnergyReport there = energy_.value(trial, w);
-    if (!(there.energy <= report.before.energy - options.armijo * alpha * report.decrement))
-      continue;
+  const double longest = w.epsilon > 0.0 ? 1.0 : energy_.longest_step(x, direction);
+  Points trial;
+  EnergyReport there;
+  const double alpha =
+      linalg::backtrack(report.before.energy, -report.decrement, longest, kTries, [&](double t) {
+        trial = energy_.move(start, direction, t);
+        there = energy_.value(trial, w);
+        return there.energy;
+      });
+  if (alpha > 0.0) {
     x = std::move(trial);
     report.after = there;
     report.alpha = alpha;
-    if (k == 0) try_double_step(x, start, direction, w, report);
+    if (alpha == longest) try_double_step(x, start, direction, w, report);
   }
   if (w.epsilon <= 0.0 && report.alpha < kHeldUp) try_held_back(x, start, taken, w, report);
   if (report.alpha == 0.0) return false;
@@ -186,7 +192,7 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& w, const NewtonOp
       down = descend(options, poll, direction, report);
     }
     if (!down) continue;
-    if (search(x, direction, w, options, report)) break;
+    if (search(x, direction, w, report)) break;
     if (report.decrement <= kRounding * std::abs(report.before.energy)) break;
   }
   return report;

@@ -13,7 +13,7 @@ import typer
 from ..errors import MeshError, OptionError
 from . import common
 from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet
-from .maps import conclude
+from .results import conclude
 
 if TYPE_CHECKING:
     from ..maps.files import LoadedMap

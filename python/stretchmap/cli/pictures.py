@@ -118,7 +118,7 @@ def demo(
     from .. import plot, samples
     from ..base.progress import terminal
     from ..volume.map import volume_map
-    from .maps import conclude
+    from .results import conclude
 
     common.require_package("matplotlib", "the demo's pictures", "plot")
     if output.exists() and not output.is_dir():

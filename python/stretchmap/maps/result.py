@@ -1,10 +1,4 @@
-"""What all maps share: mesh and image, points carried along, the report, and files.
-
-A map file is an ``.npz`` with ``V``, ``F`` or ``T``, ``image`` (n, 3), ``torus`` (2,) with R and r
-where there is one, further named arrays, and ``meta``, a JSON text of all scalars, the history and
-the versions. Every writer here writes to a temporary file first and renames it, so a failure leaves
-no file behind.
-"""
+"""What all maps share: mesh and image, points carried along, the report."""
 
 from __future__ import annotations
 
@@ -14,44 +8,31 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import io
 from ..base.arrays import read_only
-from ..base.files import atomic_path
-from ..base.options import as_path, flag, whole
+from ..base.options import flag, whole
 from ..base.tables import HasSummary, plain_dict, table, versions
-from ..base.torus import TWO_PI, Torus
+from ..base.torus import Torus
 from ..errors import OptionError
-from ..io.npz import save_npz
 from ..measures.elements import Distortion, distortion
 from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
-from .fields import carried
 from .history import IterationRecord
 from .points import PointMap
+from .writing import elements, save_map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["Kind", "MapResult"]
 
-_Map = TypeVar("_Map", bound="MapResult")
-
 # Of pictures, see `stretchmap.plot`.
 Kind = Literal[
-    "checkerboard",
-    "cutaway",
-    "levels",
-    "registration",
-    "loops",
-    "domain",
-    "ratios",
-    "convergence",
+    "checkerboard", "cutaway", "levels", "registration", "loops", "domain", "ratios", "convergence"
 ]
 
 
@@ -77,8 +58,6 @@ class MapResult(HasSummary, Exchanged):
         Why the iterations ended, in words.
     seconds : dict
         Wall-clock time per stage.
-    point_fields, cell_fields : dict of str to ndarray
-        Fields of the input by name, see `with_fields`; they go into every file.
 
     Examples
     --------
@@ -104,8 +83,6 @@ class MapResult(HasSummary, Exchanged):
     converged: bool
     stop_reason: str
     seconds: Mapping[str, float]
-    point_fields: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
-    cell_fields: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
 
     @property
     def title(self) -> str:
@@ -141,29 +118,6 @@ class MapResult(HasSummary, Exchanged):
         import stretchmap  # the front door loads pictures when they are asked for
 
         return stretchmap.plot.picture(self, kind, **options)
-
-    def with_fields(
-        self: _Map,
-        point_data: Mapping[str, ArrayLike] | None = None,
-        cell_data: Mapping[str, ArrayLike] | None = None,
-    ) -> _Map:
-        """The map with fields of its input, which its files and frames then carry.
-
-        Parameters
-        ----------
-        point_data, cell_data : mapping of str to array_like
-            Rows as the input's vertices and elements, or as those of ``mesh``. Where the input was
-            refined, a tet has the values of the tet it is a part of, an added vertex the mean of
-            its parents or, of whole numbers, the value of the first.
-
-        Raises
-        ------
-        ArrayError
-            Another number of rows, or no numbers.
-        """
-        refinement = getattr(self, "refinement", None)
-        points, cells = carried(self.mesh, refinement, point_data, cell_data)
-        return dataclasses.replace(self, point_fields=points, cell_fields=cells)
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """Further arrays to be kept in a map file, by name."""
@@ -309,11 +263,10 @@ class MapResult(HasSummary, Exchanged):
             ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``, ``.xdmf``: the source
             mesh; as point data ``image``, ``ring_ratio`` and, on a torus, ``u``, ``v``, ``s`` with
             ``cos_u``, ``sin_u``, ``cos_v``, ``sin_v``, which have no seam where the angles start
-            anew, and ``torus`` (R and r in every row); as cell data ``ratio`` and, of a refined
-            solid, ``parent_tet``; further the fields of the input. :func:`load_map` reads them,
-            too. ``.obj`` of a surface with angles: the source with (u, v) in turns as texture
-            coordinates. The other formats of :func:`stretchmap.write` hold no arrays and get the
-            image itself, of a solid where they can hold one and of its surface where not.
+            anew; as cell data ``ratio`` and, of a refined solid, ``parent_tet``. ``.obj`` of a
+            surface with angles: the source with (u, v) in turns as texture coordinates. The other
+            formats of :func:`stretchmap.write` hold no arrays and get the image itself, of a solid
+            where they can hold one and of its surface where not.
 
         Raises
         ------
@@ -322,30 +275,13 @@ class MapResult(HasSummary, Exchanged):
         OSError
             If the file cannot be written.
         """
-        path = as_path(path)
-        suffix = path.suffix.lower()
-        mesh, d = self.mesh, self.distortion
-        if suffix == ".npz":
-            self._save_npz(path)
-        elif suffix in (".vtu", ".vtk", ".xdmf"):
-            given = self.as_cells()
-            io.write(path, mesh, point_data=given.point_data, cell_data=given.cell_data)
-        elif isinstance(mesh, TetMesh):
-            if suffix in io.suffixes(solid=True):
-                io.write(path, TetMesh(self.image, mesh.T), cell_data={"ratio": d.ratios})
-            else:
-                io.write(path, TriMesh(self.image[mesh.boundary_vertices], mesh.surface.F))
-        elif suffix == ".obj" and self.angles is not None:
-            io.write(path, mesh, corner_uv=corner_turns(mesh.F, self.angles))
-        else:
-            io.write(path, TriMesh(self.image, mesh.F), cell_data={"ratio": d.ratios})
+        save_map(self, path)
 
     def as_cells(self) -> Cells:
         """The source with all fields of the map, as viewers and solvers take them."""
         mesh, cells = self.mesh, elements(self.mesh)
         points = {"image": self.image, "ring_ratio": self.distortion.ring_ratios}
-        points |= self.point_fields
-        ratios = {"ratio": self.distortion.ratios, **self.cell_fields}
+        ratios = {"ratio": self.distortion.ratios}
         for name, array in self.extra_arrays().items():
             if array.ndim in (1, 2) and array.dtype.kind in "biuf" and name not in points:
                 if len(array) == len(mesh.V):
@@ -356,37 +292,5 @@ class MapResult(HasSummary, Exchanged):
             u, v, s = self.torus.coordinates(self.image)
             points |= {"u": u, "v": v, "s": s, "cos_u": np.cos(u), "sin_u": np.sin(u)}
             points |= {"cos_v": np.cos(v), "sin_v": np.sin(v)}
-            points["torus"] = np.tile([self.torus.R, self.torus.r], (len(mesh.V), 1))
         kind = "tetra" if isinstance(mesh, TetMesh) else "triangle"
         return Cells(mesh.V, kind, cells, points, ratios)
-
-    def _save_npz(self, path: Path) -> None:
-        mesh = self.mesh
-        arrays: dict[str, NDArray[Any]] = {
-            "V": mesh.V,
-            "T" if isinstance(mesh, TetMesh) else "F": elements(mesh),
-            "image": self.image,
-            "ratios": self.distortion.ratios,
-            "ring_ratios": self.distortion.ring_ratios,
-            **self.extra_arrays(),
-            **{f"point:{name}": array for name, array in self.point_fields.items()},
-            **{f"cell:{name}": array for name, array in self.cell_fields.items()},
-        }
-        if self.torus is not None:
-            arrays["torus"] = np.array([self.torus.R, self.torus.r])
-        arrays["meta"] = np.array(json.dumps(self.to_dict(history=True), allow_nan=False))
-        with atomic_path(path) as temporary, open(temporary, "wb") as file:
-            save_npz(file, arrays)
-
-
-def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, 3, 2) chart coordinates of the corners of each face in turns, each face in one piece."""
-    turns = angles[faces] / TWO_PI
-    first = turns[:, :1] % 1.0
-    step = turns - turns[:, :1]
-    return first + step - np.round(step)
-
-
-def elements(mesh: TriMesh | TetMesh) -> NDArray[np.int32]:
-    """``T`` of a tet mesh, ``F`` of a triangle mesh."""
-    return mesh.T if isinstance(mesh, TetMesh) else mesh.F

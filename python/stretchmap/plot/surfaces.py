@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..base.options import pair
 from ..errors import OptionError
 from ..maps.given import as_map
-from ..maps.result import MapResult, corner_turns
+from ..maps.result import MapResult
+from ..maps.writing import corner_turns
 from ..mesh.given import as_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .painting import Array, Scene, View, subdivided

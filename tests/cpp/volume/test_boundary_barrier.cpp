@@ -54,7 +54,7 @@ TEST_CASE("the gradient of a gliding face is by arc length along the coordinate 
       const Face face = face_case(folded);
       Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero(), numeric;
       Eigen::Matrix<double, 6, 6> model = Eigen::Matrix<double, 6, 6>::Zero();
-      face.barrier.linearize(on_torus(face.angles), 0, epsilon, gradient, model);
+      face.barrier.model(on_torus(face.angles), 0, epsilon, gradient, model);
       for (int k = 0; k < 6; ++k) {
         const double metric = k % 2 == 0 ? kR + kr * std::cos(face.angles(k / 2, 1)) : kr;
         numeric[k] = tests::slope(

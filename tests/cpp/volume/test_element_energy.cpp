@@ -38,7 +38,7 @@ Element evaluate(const Matrix3d& J, const EnergyWeights& weights) {
     }
     batch.weight[lane] = 1.0;
   }
-  volume::element_hessians(batch, weights);
+  volume::element_models(batch, weights);
   Element out;
   out.energy = batch.energy[0];
   for (int k = 0; k < 9; ++k) out.gradient.data()[k] = batch.gradient[k][0];

@@ -64,8 +64,8 @@ TEST_CASE("faces whose vertices are fixed change no derivative") {
   Points gradient, same;
   linalg::BlockMatrix hessian = with.pattern(), model = without.pattern();
   const EnergyWeights weights{1.0, 1.0, 0.1, 0.5};
-  with.linearize(x, weights, gradient, &hessian);
-  without.linearize(x, weights, same, &model);
+  with.model(x, weights, gradient, &hessian);
+  without.model(x, weights, same, &model);
   CHECK((gradient.array() == same.array()).all());
   CHECK((hessian.values.array() == model.values.array()).all());
 }
@@ -78,7 +78,7 @@ TEST_CASE("the gradient of a solid's energy matches differences") {
     const SolidEnergy energy = energy_of(solid, motion_of(solid, fixed_every), boundary_of(solid));
     Points gradient;
     linalg::BlockMatrix hessian = energy.pattern();
-    energy.linearize(x, weights, gradient, &hessian);
+    energy.model(x, weights, gradient, &hessian);
     REQUIRE(hessian.values.allFinite());
     Points step = tests::random_points(energy.rows(), 5);
     step.array() *= (gradient.array() != 0.0).cast<double>();  // no normals of gliding vertices

@@ -10,30 +10,24 @@
 // alone the few faces that hold most of the chart at first cost nothing and are crushed.
 #pragma once
 
-#include <optional>
-
 #include "stretchmap/area/chart.hpp"
-#include "stretchmap/area/surface_pattern.hpp"
+#include "stretchmap/area/chart_system.hpp"
 #include "stretchmap/area/surface_quality.hpp"
 #include "stretchmap/area/surface_sem.hpp"
 #include "stretchmap/area/triangle_energy.hpp"
 #include "stretchmap/base/types.hpp"
-#include "stretchmap/linalg/block_ldlt.hpp"
 
 namespace stretchmap::area {
 
-struct ChartStep {
-  double before = 0.0;     // energy with this step's targets, before
-  double after = 0.0;      // and after the step
-  double step = 0.0;       // fraction of the Newton step taken, 0: none decreases the energy
-  double decrement = 0.0;  // Newton decrement g' H^-1 g
-  double within = 0.0;     // share of the source's area whose target was its own share
+struct ChartStep : NewtonStep {
+  double within = 0.0;  // share of the source's area whose target was its own share
 };
 
 class ChartNewton {
  public:
-  // reference: as surface_reference gives it; aspect: length of the torus along u over that along
-  // v; turns (n, 2) without folded faces.
+  // \param reference as surface_reference gives it.
+  // \param aspect length of the torus along u over that along v.
+  // \param turns (n, 2) without folded faces.
   // \throws Error "SolverError" if a face is folded (ids: faces).
   ChartNewton(SurfaceChart chart, SurfaceReference reference, double aspect, Points2 turns);
 
@@ -51,15 +45,14 @@ class ChartNewton {
   Targets targets(double reach) const;
   Eigen::Matrix2d rest(const Targets& targets, Index f) const;
   Eigen::Matrix2d jacobian(const Points2& turns, const Targets& targets, Index f) const;
-  double energy(const Points2& turns, const TriangleWeights& weights, const Targets& targets) const;
+  double value(const Points2& turns, const TriangleWeights& weights, const Targets& targets) const;
 
   SurfaceChart chart_;
   SurfaceReference reference_;
   Eigen::Vector2d periods_;
   Points2 turns_;
   Rows rest_;  // (m, 4) inverse edge matrices of the source triangles, row-major
-  SurfacePattern pattern_;
-  std::optional<linalg::BlockLdlt<2>> solver_;  // from the first step on
+  ChartSystem system_;
 };
 
 }  // namespace stretchmap::area

@@ -45,24 +45,27 @@ struct GlideEnergy {
   Rows hessians;       // (m, 36) one 6x6 matrix per face, empty if not asked for
 };
 
-enum class Derivatives { kNone, kGradient, kHessian, kModel };
+enum class Derivatives { kNone, kHessian, kModel };
 
-// angles (n, 2): (u, v) in radians. kHessian is exact; kModel is what Newton steps use: positive
-// semi-definite face by face, with a part of the areas' own curvature only.
+// \param angles (n, 2) (u, v) in radians.
+// \param derivatives kHessian is exact; kModel is what Newton steps use: positive semi-definite
+// face
+//        by face, with a part of the areas' own curvature only.
 GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                          const Points2Ref& angles, Derivatives derivatives);
 
-// The scale at which the area term is least: sqrt(sum (w rho) / sum (w / rho)), rho = |g| / |t|.
+// \return the scale at which the area term is least: sqrt(sum (w rho) / sum (w / rho)), with
+//         rho = |g| / |t|.
 double best_scale(const GlideProblem& problem, const Points2Ref& angles);
 
-// (n, 3) points of the torus of area one.
+// \return (n, 3) points of the torus of area one.
 Points glide_image(const GlideProblem& problem, const Points2Ref& angles);
 
-// Least of the faces' least component of the area vector along the torus' normal over the source
-// area: positive where the certificate's condition holds on every face.
+// \return least of the faces' least component of the area vector along the torus' normal over the
+//         source area: positive where the certificate's condition holds on every face.
 double least_facing(const GlideProblem& problem, const Points2Ref& angles);
 
-// (m) areas of the polyhedral image; the torus itself has area one.
+// \return (m) areas of the polyhedral image; the torus itself has area one.
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles);
 
 }  // namespace stretchmap::area

@@ -10,18 +10,24 @@ namespace stretchmap::area {
 // `block` unknowns per vertex; unknown c of vertex i is block * i + c.
 class SurfacePattern {
  public:
+  // \param faces (m, 3) ids below n_vertices.
   SurfacePattern(const FacesRef& faces, Index n_vertices, int block);
 
   // All zeros, both triangles stored.
   const SparseMatrix& zeros() const { return zeros_; }
 
-  // elements (m, (3 block)^2): row f is the matrix of face f, row-major, unknown c of its corner k
-  // at block * k + c. Overwrites `values` with the sum over the faces, faces in order.
+  // Overwrites `values` with the sum over the faces, faces in order.
+  // \param elements (m, (3 block)^2) row f is the matrix of face f, row-major, unknown c of its
+  //        corner k at block * k + c.
   void scatter(const RowsRef& elements, double* values) const;
 
  private:
   SparseMatrix zeros_;
   std::vector<Index> slot_;  // m (3 block)^2 positions in the value array
 };
+
+// \param gradients (m, 6) by the two coordinates of each face's corners.
+// \return (2 n) their sum, faces in order.
+Vec sum_corners(const FacesRef& faces, Index n_vertices, const Rows& gradients);
 
 }  // namespace stretchmap::area

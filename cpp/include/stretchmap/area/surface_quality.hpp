@@ -29,13 +29,13 @@ struct SurfaceQuality {
   double angle_max = 0.0;
 };
 
-// image (n, 3); areas are unsigned here.
+// \param image (n, 3); areas are unsigned here.
 SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef& faces,
                                const PointsRef& image);
 
-// Quality of the image on the torus of each candidate (phase, ratio), (k, 2), to about 1e-6: radii
-// R / r = ratio, area one, turns (n, 2) being u and the equal-area coordinate before `phase` is
-// added.
+// \param turns (n, 2) u and the equal-area coordinate before the phase is added.
+// \param candidates (k, 2) phase in turns and ratio R / r.
+// \return quality of the image on the torus of each candidate, to about 1e-6.
 std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
                                             const FacesRef& faces, const Points2Ref& turns,
                                             const Points2Ref& candidates);

@@ -28,8 +28,9 @@ struct SemStep {
 
 class SurfaceSem {
  public:
-  // areas (m): source areas, scaled here to total one; aspect: length of the torus along u over
-  // that along v; turns (n, 2): where to start, faces already turned over are allowed.
+  // \param areas (m) source areas, scaled here to total one.
+  // \param aspect length of the torus along u over that along v.
+  // \param turns (n, 2) where to start, faces already turned over are allowed.
   SurfaceSem(SurfaceChart chart, const VecRef& areas, double aspect, Points2 turns);
 
   // \throws Error "SolverError" when the factorization breaks down.
@@ -49,7 +50,8 @@ class SurfaceSem {
   std::optional<linalg::SpdSolver> solver_;  // from the first step on
 };
 
-// Fills in ring_sd, face_sd and face_error from shares of the total area (each sums to one).
+// \param source,image (m) shares of the total area, each sums to one.
+// \param figures ring_sd, face_sd and face_error are filled in.
 void ratio_figures(const FacesRef& faces, Index n_vertices, const VecRef& source,
                    const VecRef& image, SurfaceFigures& figures);
 

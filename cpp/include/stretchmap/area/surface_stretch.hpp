@@ -9,16 +9,18 @@
 
 namespace stretchmap::area {
 
-// areas (m): source areas |t| > 0, throughout. The gradient of E_S is 2 L_S(g) g.
+// \param areas (m) source areas |t| > 0, throughout.
+// \return E_S; its gradient is 2 L_S(g) g.
 double surface_stretch_energy(const FacesRef& faces, const VecRef& areas, const PointsRef& image);
 
-// L_S(g), (n, n), both triangles, positive semi-definite.
+// \return L_S(g), (n, n), both triangles, positive semi-definite.
 SparseMatrix surface_stretch_laplacian(const SurfacePattern& pattern, const FacesRef& faces,
                                        const VecRef& areas, const PointsRef& image);
 
-// The same in the flat torus with periods `periods` (turns are multiplied by them). There
-// E_S is the sum of squared signed areas over |t|; with areas and periods of total area one it is
-// at least 1, and 1 exactly for an area-preserving map.
+// The same in the flat torus.
+// \param periods what turns are multiplied by.
+// \return the sum of squared signed areas over |t|; with areas and periods of total area one it is
+//         at least 1, and 1 exactly for an area-preserving map.
 double chart_stretch_energy(const SurfaceChart& chart, const VecRef& areas,
                             const Eigen::Vector2d& periods, const Points2Ref& turns);
 
@@ -26,8 +28,9 @@ SparseMatrix chart_stretch_laplacian(const SurfacePattern& pattern, const Surfac
                                      const VecRef& areas, const Eigen::Vector2d& periods,
                                      const Points2Ref& turns);
 
-// Product of L_S(frozen) with the multivalued coordinates `turns` (4.5): (n, 2), zero where they
-// are stretched-harmonic. With frozen = turns it is half the gradient of E_S over the periods.
+// \return (n, 2) product of L_S(frozen) with the multivalued coordinates `turns` (4.5), zero where
+//         they are stretched-harmonic. With frozen = turns it is half the gradient of E_S over the
+//         periods.
 Points2 chart_stretch_product(const SurfaceChart& chart, const VecRef& areas,
                               const Eigen::Vector2d& periods, const Points2Ref& frozen,
                               const Points2Ref& turns);

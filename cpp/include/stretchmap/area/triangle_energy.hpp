@@ -16,12 +16,13 @@ struct TriangleWeights {
   double area = 0.5;
 };
 
-// Value; +infinity when det K <= 0.
-double triangle_energy(const Eigen::Matrix2d& K, const TriangleWeights& weights = {});
+// \return phi(K), +infinity when det K <= 0.
+double triangle_value(const Eigen::Matrix2d& K, const TriangleWeights& weights = {});
 
-// Value, gradient and Hessian with respect to vec(K) (column-major), the latter with its negative
-// eigenvalues set to zero. \pre det K > 0.
-double triangle_energy(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H,
-                       const TriangleWeights& weights = {});
+// \param P,H gradient and Hessian with respect to vec(K) (column-major), the latter with its
+//        negative eigenvalues set to zero.
+// \pre det K > 0.
+void triangle_model(const Eigen::Matrix2d& K, Eigen::Matrix2d& P, Matrix4& H,
+                    const TriangleWeights& weights = {});
 
 }  // namespace stretchmap::area

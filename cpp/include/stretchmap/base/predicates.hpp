@@ -8,15 +8,14 @@ namespace stretchmap {
 
 using Point = Eigen::Vector3d;
 
-// Sign of det(b - a, c - a, d - a): +1 when (a, b, c, d) is a positively oriented tet, -1 when it
-// is inverted, 0 when it is flat.
-// Exact as long as the coordinate differences that are not zero lie between 2^-300 and 2^300 in
-// absolute value, rounding parts included; outside that range 0 is returned unless the error bound
-// settles the sign, so a nonzero answer can always be trusted.
+// \return sign of det(b - a, c - a, d - a): +1 when (a, b, c, d) is a positively oriented tet, -1
+// when it is inverted, 0 when it is flat. Exact as long as the coordinate differences that are not
+// zero lie between 2^-300 and 2^300 in absolute value, rounding parts included; outside that range
+// 0 is returned unless the error bound settles the sign, so a nonzero answer can always be trusted.
 int orient3d(const Point& a, const Point& b, const Point& c, const Point& d);
 
-// Sign of det(b - a, c - a) of the points without coordinate `axis` (0, 1, 2), the other two in
-// ascending order. Trust as above.
+// \return sign of det(b - a, c - a) of the points without coordinate `axis` (0, 1, 2), the other
+// two in ascending order. Trust as above.
 int orient2d(const Point& a, const Point& b, const Point& c, int axis);
 
 }  // namespace stretchmap

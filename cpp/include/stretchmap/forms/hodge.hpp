@@ -6,8 +6,10 @@
 
 namespace stretchmap::forms {
 
-// (m, 3) the tangent vector of each face whose product with an edge is the closed form (e) on that
-// edge, (3.6).
+// \param form (e) closed.
+// \return (m, 3) the tangent vector of each face whose product with an edge is the form on that
+// edge,
+//         (3.6).
 Points form_vectors(const mesh::SurfaceTopology& top, const PointsRef& points, const VecRef& form);
 
 struct HodgeProducts {
@@ -20,8 +22,9 @@ struct HodgeProducts {
 HodgeProducts hodge_products(const mesh::SurfaceTopology& top, const PointsRef& points,
                              const RowsRef& forms);
 
-// (m) integral of first ^ second over each face: the signed area of the face in the chart whose
-// coordinates have these differentials.
+// \param first,second (e) closed forms.
+// \return (m) integral of first ^ second over each face: its signed area in the chart whose
+//         coordinates have these differentials.
 Vec chart_areas(const mesh::SurfaceTopology& top, const VecRef& first, const VecRef& second);
 
 }  // namespace stretchmap::forms

@@ -24,19 +24,23 @@ struct HomologyGenerators {
 // \throws Error "ConnectivityError" when the surface has more than one component.
 HomologyGenerators tree_cotree(const mesh::SurfaceTopology& top, const VecRef& edge_length);
 
-// The half-edge from vertex i to vertex j, -1 when there is no such edge. Closed surfaces only.
+// \return the half-edge from vertex i to vertex j, -1 when there is no such edge.
+// \pre the surface is closed.
 Index find_halfedge(const mesh::SurfaceTopology& top, Index i, Index j);
 
 // The half-edges along a loop; entry k leaves loop[k].
 // \throws Error "ArrayError" when two consecutive vertices are not joined by an edge.
 std::vector<Index> loop_halfedges(const mesh::SurfaceTopology& top, const Loop& loop);
 
-// (k) integrals of k integer 1-forms (k, e) along a loop.
+// \param forms (k, e) integer 1-forms.
+// \return (k) their integrals along a loop.
 IndexVec periods(const mesh::SurfaceTopology& top, const Eigen::Ref<const IndexRows>& forms,
                  const Loop& loop);
 
-// (k, k) integrals of form_i ^ form_j over the surface: on a face with corners 0, 1, 2 it is
-// (a01 b12 - a12 b01) / 2. Antisymmetric, integer for integer closed forms.
+// \param forms (k, e)
+// \return (k, k) integrals of form_i ^ form_j over the surface: on a face with corners 0, 1, 2 it
+// is
+//         (a01 b12 - a12 b01) / 2. Antisymmetric, integer for integer closed forms.
 Rows wedge_matrix(const mesh::SurfaceTopology& top, const RowsRef& forms);
 
 }  // namespace stretchmap::homology

@@ -13,8 +13,8 @@ namespace stretchmap::linalg {
 template <int K>
 class BlockLdlt {
  public:
-  // A square, compressed, both triangles stored, made of full K x K blocks with the diagonal ones
-  // among them, as SurfacePattern builds it; only the pattern is read.
+  // \param A square, compressed, both triangles stored, made of full K x K blocks with the diagonal
+  //        ones among them, as SurfacePattern builds it; only the pattern is read.
   explicit BlockLdlt(const SparseMatrix& A);
 
   // \pre the pattern given to the constructor.

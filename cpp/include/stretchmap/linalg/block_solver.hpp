@@ -27,11 +27,11 @@ struct BlockOptions {
   std::string preconditioner = "multigrid";
 };
 
-// Displacements that cost (next to) no energy, as columns over the 3 n unknowns: three
-// translations, (3 n, 3).
+// \return (3 n, 3) displacements that cost (next to) no energy, as columns over the 3 n unknowns:
+//         three translations.
 Rows translations(Index n);
 
-// Three translations and three infinitesimal rotations of the points, (3 n, 6).
+// \return (3 n, 6) three translations and three infinitesimal rotations of the points.
 Rows rigid_body_modes(const PointsRef& points);
 
 // Conjugate gradients for one right-hand side, made for inexact Newton steps.
@@ -52,8 +52,8 @@ class BlockSolver {
   const BlockMatrix& matrix() const;
 
   // After matrix().values changed (same pattern): renews numbers on the old hierarchy, which is
-  // built again when convergence is seen to suffer. keep_preconditioner: solve with the new values,
-  // precondition with the old ones.
+  // built again when convergence is seen to suffer.
+  // \param keep_preconditioner solve with the new values, precondition with the old ones.
   void refactor(bool keep_preconditioner = false);
 
   // Solves A x = b for b (n, 3), from x (n, 3). Should a direction of negative curvature turn up,

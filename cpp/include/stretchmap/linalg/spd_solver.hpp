@@ -32,8 +32,7 @@ class SpdSolver {
  public:
   // \pre A square, compressed, structurally symmetric, both triangles stored, diagonal present.
   // \throws OptionError (unknown backend), MissingDependencyError (no CHOLMOD), SolverError (not
-  // symmetric, not positive definite, not
-  //         finite; ids are rows where a culprit is known).
+  //         symmetric, not positive definite, not finite; ids are rows where a culprit is known).
   explicit SpdSolver(SparseMatrix A, const SpdOptions& options = {});
   ~SpdSolver();
   SpdSolver(SpdSolver&&) noexcept;
@@ -55,7 +54,7 @@ class SpdSolver {
   SolveReport solve(const RowsRef& B, Eigen::Ref<Rows> X, const SolveOptions& options = {},
                     const Poll& poll = {});
 
-  // The backend chosen: as in SpdOptions, not "auto".
+  // \return the backend chosen: as in SpdOptions, not "auto".
   const std::string& backend() const;
 
  private:

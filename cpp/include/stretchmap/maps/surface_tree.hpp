@@ -23,13 +23,16 @@ struct SurfaceFeet {
 
 class SurfaceTree {
  public:
-  // points (n, 3), faces (m, 3), which are copied. \pre m > 0
+  // \param points,faces (n, 3) and (m, 3), copied.
+  // \pre m > 0
   SurfaceTree(const PointsRef& points, const FacesRef& faces);
 
-  // The closest points of many.
+  // \param queries (n, 3)
+  // \return their closest points.
   SurfaceFeet feet(const PointsRef& queries, const Poll& poll = {}) const;
 
-  // The closest point; `hint` is a face to begin with, any face is right, a near one is faster.
+  // \param hint a face to begin with: any is right, a near one is faster.
+  // \return the closest point.
   Foot closest(const Eigen::Vector3d& query, Index hint = 0) const;
 
   const Points& points() const { return points_; }

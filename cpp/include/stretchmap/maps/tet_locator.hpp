@@ -15,12 +15,13 @@ struct TetLocation {
 
 class TetLocator {
  public:
-  // points (n, 3), tets (k, 4), which are copied. A point no farther than `tolerance` outside a tet
-  // counts as in it, with weights that are then slightly negative: they still reproduce the point.
-  // \pre tolerance >= 0. Tets without positive volume are never answered.
+  // \param points,tets (n, 3) and (k, 4), copied. Tets without positive volume are never answered.
+  // \param tolerance >= 0: a point no farther outside a tet counts as in it, with weights that are
+  //        then slightly negative: they still reproduce the point.
   TetLocator(const PointsRef& points, const TetsRef& tets, double tolerance);
 
-  // Among the tets that hold a point, the first; else the one whose faces it violates least.
+  // \param queries (n, 3)
+  // \return the first of the tets that hold a point, else the one whose faces it violates least.
   TetLocation locate(const PointsRef& queries, const Poll& poll = {}) const;
 
  private:

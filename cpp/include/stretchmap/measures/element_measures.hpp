@@ -17,12 +17,13 @@ struct ElementMeasures {
 };
 
 // Faces of a surface mapped by points -> image.
-// sign: (m) +1 where the image face is positively oriented, -1 where it is flipped, 0 where that
-// cannot be told apart (its image area then counts as zero).
+// \param sign (m) +1 where the image face is positively oriented, -1 where it is flipped, 0 where
+//        that cannot be told apart (its image area then counts as zero).
 ElementMeasures face_measures(const PointsRef& points, const FacesRef& faces,
                               const PointsRef& image, const VecRef& sign);
 
-// Tets mapped by points -> image; sizes are signed volumes, det(v1-v0, v2-v0, v3-v0) / 6.
+// \param points,image (n, 3) each.
+// \return sizes are signed volumes, det(v1-v0, v2-v0, v3-v0) / 6.
 ElementMeasures tet_measures(const PointsRef& points, const TetsRef& tets, const PointsRef& image);
 
 // (n) sum of the values of the elements around each vertex, in the order of the elements.

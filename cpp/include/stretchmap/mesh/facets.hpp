@@ -34,14 +34,16 @@ FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& s
 FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices);
 FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
-// Vertices of half-face h, in its outward order.
+// \return vertices of half-face h, in its outward order.
 inline Eigen::Matrix<Index, 1, 3> half_face(const TetsRef& tets, Index h) {
   const int* corner = kTetFace[h % 4];
   const Index t = h / 4;
   return {tets(t, corner[0]), tets(t, corner[1]), tets(t, corner[2])};
 }
 
-// +1 when two triples with the same three vertices run round the triangle the same way, else -1.
+// \return +1 when two triples with the same three vertices run round the triangle the same way,
+// else
+//         -1.
 int same_turn(const Eigen::Matrix<Index, 1, 3>& a, const Eigen::Matrix<Index, 1, 3>& b);
 
 }  // namespace stretchmap::mesh

@@ -22,7 +22,7 @@ struct Patches {
 Patches face_patches(const FacesRef& faces, const FacetGroups& half_edges, const Mask& skip = {});
 Patches tet_patches(const TetsRef& tets, const FacetGroups& half_faces, const Mask& skip = {});
 
-// Which elements to turn so that every patch is consistent and
+// \return which elements to turn so that every patch is consistent and
 // - a closed patch of faces encloses a positive volume, an open one goes with its majority (with
 //   its first face in a draw);
 // - a patch of tets has a positive volume in total.
@@ -31,12 +31,12 @@ Patches tet_patches(const TetsRef& tets, const FacetGroups& half_faces, const Ma
 Mask faces_to_turn(const PointsRef& points, const FacesRef& faces, const Patches& patches);
 Mask tets_to_turn(const PointsRef& points, const TetsRef& tets, const Patches& patches);
 
-// The same for a whole mesh, as ids. Elements that repeat a vertex and second copies of an element
-// take no part and are never turned.
+// \return the same for a whole mesh, as ids. Elements that repeat a vertex and second copies of an
+//         element take no part and are never turned.
 IndexVec misoriented_faces(const PointsRef& points, const FacesRef& faces);
 IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets);
 
-// Indices of all set entries.
+// \return indices of all set entries, ascending.
 IndexVec set_entries(const Mask& mask);
 
 }  // namespace stretchmap::mesh

@@ -21,7 +21,7 @@ TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices, const Poll& poll
 // \throws as above.
 IndexVec tet_neighbors(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
-// (e, 2) edges of a tet mesh, lower id first, in lexicographic order.
+// \return (e, 2) edges of a tet mesh, lower id first, in lexicographic order.
 Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 }  // namespace stretchmap::mesh

@@ -17,14 +17,16 @@ struct TetSplit {
 
 // Cuts every tet along values = 0. Neighbors agree on the new vertices and on the diagonals of cut
 // faces, so the result is conforming and either side has a closed boundary.
-// values (n). A vertex closer to the level than 1e-9 of one of its edges is taken to lie on it.
-// gate (n) or empty: only the part of the level where the gate is positive is cut; a tet that the
-// rest would cut stays whole and gets the sign of its largest value.
+// \param values (n) A vertex closer to the level than 1e-9 of one of its edges is taken to lie on
+// it. \param gate (n) or empty: only the part of the level where it is positive is cut; a tet that
+// the
+//        rest would cut stays whole and gets the sign of its largest value.
 // \pre with a gate: no tet crosses the level on both sides of the gate.
 TetSplit split_tets(const TetsRef& tets, const VecRef& values, const VecRef& gate);
 
-// Volume where a function, linear on every tet and given at the vertices, is negative.
-// tets (k, 4), volumes (k) of the tets, values (n).
+// \param volumes (k) of the tets.
+// \param values (n) of a function that is linear on every tet.
+// \return the volume where it is negative.
 double volume_below(const TetsRef& tets, const VecRef& volumes, const VecRef& values);
 
 }  // namespace stretchmap::partitions

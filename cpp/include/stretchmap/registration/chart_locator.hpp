@@ -26,10 +26,10 @@ class ChartLocator {
   // Faces without positive area are never answered.
   ChartLocator(area::SurfaceChart chart, const Points2Ref& turns);
 
-  // queries (n, 2) in turns, any branch.
+  // \param queries (n, 2) in turns, any branch.
   FaceLocation locate(const Points2Ref& queries) const;
 
-  // The same for one point, without threads.
+  // \return the same for one point, without threads.
   Hit find(const Eigen::Vector2d& query) const;
 
  private:

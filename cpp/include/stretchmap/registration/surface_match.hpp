@@ -11,8 +11,15 @@
 
 namespace stretchmap::registration {
 
-// Psi for chart positions y (n, 2) and points X (n, 3); +infinity if a face is folded in the chart.
-// rest (m, 4): inverse edge matrices as of rest_triangles; weights (m).
+// \param y (n, 2) chart positions.
+// \param X (n, 3) points there.
+// \param rest (m, 4) inverse edge matrices as of rest_triangles.
+// \return phi of face f, +infinity if it is folded in the chart.
+double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                   const RowsRef& rest, Index f);
+
+// \param weights (m)
+// \return Psi, +infinity if a face is folded.
 double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
                    const RowsRef& rest, const VecRef& weights);
 
@@ -33,7 +40,8 @@ MatchModel match_model(const area::SurfaceChart& chart, const Points2Ref& y, con
                        const RowsRef& slopes, const RowsRef& rest, const VecRef& weights);
 
 // The same energy for the map into the plane, where the target is the flat torus itself: P_f is
-// lattice * E_f, the columns of `lattice` being the two periods.
+// lattice * E_f.
+// \param lattice the two periods as columns.
 double flat_value(const area::SurfaceChart& chart, const Points2Ref& y,
                   const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights);
 

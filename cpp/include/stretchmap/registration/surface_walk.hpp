@@ -13,11 +13,13 @@ struct SurfaceWalk {
   RowsRef slopes;               // (m, 6) of each face: derivative of the point by the chart,
                                 // row-major 3x2
 
-  // The point at chart position y; false if no face holds y.
+  // \param x the point at chart position y.
+  // \return false if no face holds y.
   bool point(const Eigen::RowVector2d& y, Eigen::RowVector3d& x) const;
 
-  // Chart steps that move a point by one unit along two orthogonal directions of its face, as
-  // columns; zero if no face holds y.
+  // \return chart steps that move a point by one unit along two orthogonal directions of its face,
+  // as
+  //         columns; zero if no face holds y.
   Eigen::Matrix2d steps(const Eigen::RowVector2d& y) const;
 };
 

@@ -26,14 +26,19 @@ struct FitSamples {
 
 class BoundaryFit {
  public:
-  // Surface: points (n, 3), faces (m, 3), outward unit normals of the vertices (n, 3); samples of
-  // it by face (s) and barycentric coordinates (s, 3), each standing for the same area. quads (q,
-  // 4), seen from outside. per_side^2 samples are taken of each quad.
+  // \param points,faces,normals of the surface: (n, 3), (m, 3), outward unit normals of the
+  // vertices
+  //        (n, 3).
+  // \param sample_faces,sample_weights samples of it by face (s) and barycentric coordinates (s,
+  // 3),
+  //        each standing for the same area.
+  // \param quads (q, 4) of the grid, seen from outside; per_side^2 samples are taken of each.
   BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
               const IndexVecRef& sample_faces, const PointsRef& sample_weights,
               const TetsRef& quads, int per_side);
 
-  // The samples for grid points x.
+  // \param x points of the grid.
+  // \return their samples.
   FitSamples match(const PointsRef& x) const;
 
  private:

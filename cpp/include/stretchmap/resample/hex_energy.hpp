@@ -35,20 +35,23 @@ struct HexReport {
 
 class HexEnergy {
  public:
-  // hexes (k, 8), ids below n.
+  // \param hexes (k, 8) ids below n.
   HexEnergy(const HexesRef& hexes, Index n);
 
-  // Side lengths (k, 3) and weights (k) of the boxes. To be called before anything else below.
+  // To be called before anything else below.
+  // \param sides (k, 3) lengths of the boxes.
+  // \param weights (k)
   void set_rest(const RowsRef& sides, const VecRef& weights);
-  // The corners of a sample have to be those of a face of a hexahedron. factor (s): the c_j.
+  // \param samples their corners are those of a face of a hexahedron.
+  // \param factor (s) the c_j.
   void set_fit(FitSamples samples, const VecRef& factor);
 
   Index rows() const { return n_; }
   linalg::BlockMatrix pattern() const;
   HexReport value(const PointsRef& x, const HexWeights& w) const;
   // Gradient (n, 3) and positive semi-definite Hessian. \pre value(x, w).energy is finite.
-  void linearize(const PointsRef& x, const HexWeights& w, Points& gradient,
-                 linalg::BlockMatrix& hessian) const;
+  void model(const PointsRef& x, const HexWeights& w, Points& gradient,
+             linalg::BlockMatrix& hessian) const;
 
  private:
   void load(const PointsRef& x, Index h, volume::ElementBatch& batch) const;

@@ -44,11 +44,12 @@ std::array<double, 27> jacobian_coefficients(const std::array<Eigen::Vector3d, 8
 // \param points (n, 3). \param hexes (k, 8), ids below n. \return (k) 1 for valid, else 0.
 Flags valid_hexes(const PointsRef& points, const HexesRef& hexes);
 
-// Jacobian at each corner over the product of the three edge lengths there, (k, 8); 0 where an edge
-// has no length.
+// \return (k, 8) Jacobian at each corner over the product of the three edge lengths there; 0 where
+// an
+//         edge has no length.
 Rows8 scaled_jacobians(const PointsRef& points, const HexesRef& hexes);
 
-// Volumes of the trilinear hexahedra, (k).
+// \return (k) volumes of the trilinear hexahedra.
 Vec hex_volumes(const PointsRef& points, const HexesRef& hexes);
 
 }  // namespace stretchmap::resample

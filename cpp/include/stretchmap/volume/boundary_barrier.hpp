@@ -15,7 +15,7 @@
 
 #include <memory>
 
-#include "stretchmap/base/types.hpp"
+#include "stretchmap/mesh/size.hpp"
 #include "stretchmap/volume/element_energy.hpp"
 #include "stretchmap/volume/glide_surface.hpp"
 
@@ -43,13 +43,14 @@ class BoundaryBarrier {
   const Faces& faces() const { return boundary_.faces; }
   const GlideSurface& surface() const { return *boundary_.surface; }
 
-  // Weighted energy of face f for vertices x (n, 3) on the surface.
+  // \param x (n, 3) vertices, those of the face on the surface.
+  // \return weighted energy of face f.
   FaceReport value(const PointsRef& x, Index f, double epsilon) const;
 
-  // Adds to `gradient` and `hessian` the derivatives by steps of the three vertices along the first
-  // two axes of their frames.
-  void linearize(const PointsRef& x, Index f, double epsilon, Eigen::Matrix<double, 6, 1>& gradient,
-                 Eigen::Matrix<double, 6, 6>& hessian) const;
+  // \param gradient,hessian what the derivatives by steps of the three vertices along the first two
+  //        axes of their frames are added to.
+  void model(const PointsRef& x, Index f, double epsilon, Eigen::Matrix<double, 6, 1>& gradient,
+             Eigen::Matrix<double, 6, 6>& hessian) const;
 
  private:
   struct State;
@@ -58,10 +59,11 @@ class BoundaryBarrier {
   GlidingBoundary boundary_;
 };
 
-// Inverse edge matrices (m, 4), row-major, of the triangles, each in its own plane and enlarged so
-// that the total area grows by the factor `scale` (image area over source area). As in
-// rest_matrices, the shape of a sliver is not to be kept: it is clamped to `max_aspect` relative to
-// the regular triangle, its area kept. \pre all faces have positive area.
+// As in rest_matrices, the shape of a sliver is not to be kept: it is clamped to `max_aspect`
+// relative to the regular triangle, its area kept.
+// \param scale image area over source area, by which the triangles are enlarged.
+// \return (m, 4) inverse edge matrices, row-major, each in the triangle's own plane.
+// \pre all faces have positive area.
 Rows rest_triangles(const PointsRef& V, const FacesRef& faces, double scale, double max_aspect);
 
 }  // namespace stretchmap::volume

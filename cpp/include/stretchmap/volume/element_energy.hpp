@@ -24,11 +24,11 @@ struct EnergyWeights {
   double face = 0.0;     // of the boundary triangles, where the boundary glides
 };
 
-// chi(det) and its first two derivatives.
 struct Regularized {
   double value, first, second;
 };
 
+// \return chi(det) and its first two derivatives.
 inline Regularized regularized(double det, double epsilon) {
   if (epsilon <= 0.0) return {det, 1.0, 0.0};
   const double root = std::sqrt(epsilon * epsilon + det * det);
@@ -56,15 +56,34 @@ struct ElementBatch {
                                  // major, for (a, b) = 00 01 02 11 12 22
 };
 
-// Fills energy and det.
+// \param batch its energy and det are filled.
 void element_values(ElementBatch& batch, const EnergyWeights& w);
 
-// Fills energy, det and gradient. \pre the energies are finite, here and below.
+// \param batch its energy, det and gradient are filled.
+// \pre the energies are finite, here and below.
 void element_gradients(ElementBatch& batch, const EnergyWeights& w);
 
-// Fills all. The blocks are those of the Hessian of psi by vec(J) with its negative eigenvalues set
-// to zero, which come in closed form from the singular values (Smith, de Goes, Kim, ACM TOG 38(1),
-// 2019).
-void element_hessians(ElementBatch& batch, const EnergyWeights& w);
+// \param batch all is filled. The blocks are those of the Hessian of psi by vec(J) with its
+//        negative eigenvalues set to zero, which come in closed form from the singular values
+//        (Smith, de Goes, Kim, ACM TOG 38(1), 2019).
+void element_models(ElementBatch& batch, const EnergyWeights& w);
+
+using Block3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+// \param H factor times the second derivatives of one lane by all four corners: rows and columns
+//        of the first are minus the sums of the others'.
+inline void tet_blocks(const ElementBatch& batch, int lane, double factor, Block3 (&H)[4][4]) {
+  int at = 0;
+  for (int a = 1; a < 4; ++a)
+    for (int b = a; b < 4; ++b, ++at) {
+      for (int i = 0; i < 9; ++i) H[a][b](i / 3, i % 3) = factor * batch.block[at][i][lane];
+      if (b > a) H[b][a] = H[a][b].transpose();
+    }
+  for (int a = 1; a < 4; ++a) {
+    H[a][0] = -(H[a][1] + H[a][2] + H[a][3]);
+    H[0][a] = H[a][0].transpose();
+  }
+  H[0][0] = -(H[0][1] + H[0][2] + H[0][3]);
+}
 
 }  // namespace stretchmap::volume

@@ -10,22 +10,24 @@ class GlideSurface {
  public:
   virtual ~GlideSurface() = default;
 
-  // Orthonormal axes at a point of the surface, as columns: two along it, then the outward normal.
+  // \return orthonormal axes at a point of the surface, as columns: two along it, then the outward
+  //         normal.
   virtual Eigen::Matrix3d frame(const Eigen::Vector3d& x) const = 0;
 
-  // Unit vector that points outward; the normal for a point of the surface, and smooth near it, so
-  // that it serves for points of the flat triangles between its vertices, too.
+  // \return unit vector that points outward; the normal for a point of the surface, and smooth near
+  // it, so that it serves for points of the flat triangles between its vertices, too.
   virtual Eigen::Vector3d outward(const Eigen::Vector3d& x) const = 0;
   virtual Eigen::Matrix3d outward_derivative(const Eigen::Vector3d& x) const = 0;
 
-  // Where a point of the surface comes to by a step along the first two axes of its frame.
+  // \return where a point of the surface comes to by a step along the first two axes of its frame.
   virtual Eigen::Vector3d moved(const Eigen::Vector3d& x, const Eigen::Vector2d& step) const = 0;
 
-  // Second derivatives of `moved` by the step at zero, in the direction g, itself in the frame of
-  // x: what a gradient g adds to the Hessian because the surface is curved.
+  // \param g a gradient at x, in its frame.
+  // \return second derivatives of `moved` by the step at zero, in the direction g: what it adds to
+  //         the Hessian because the surface is curved.
   virtual Eigen::Matrix2d bending(const Eigen::Vector3d& x, const Eigen::Vector3d& g) const = 0;
 
-  // Total area, the scale of the boundary's rest triangles.
+  // \return total area, the scale of the boundary's rest triangles.
   virtual double area() const = 0;
 };
 

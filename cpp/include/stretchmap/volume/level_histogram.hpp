@@ -13,8 +13,8 @@ namespace stretchmap::volume {
 Points2 level_histogram(const TetsRef& tets, const VecRef& values, const Points2Ref& amounts,
                         Index bins, double period, bool periodic);
 
-// (k) mean over each tet of a function of the same values that is constant in every bin, by the
-// same rule. table: (bins).
+// \param table (bins) a function of the same values, constant in every bin.
+// \return (k) its mean over each tet, by the same rule.
 Vec level_lookup(const TetsRef& tets, const VecRef& values, const VecRef& table, double period,
                  bool periodic);
 

@@ -28,7 +28,7 @@ class RingProjection {
   RingStep step(const PointsRef& x, const VecRef& target, double tol, int max_cg,
                 const Poll& poll = {}) const;
 
-  // Largest relative error of a free vertex' ring.
+  // \return largest relative error of a free vertex' ring.
   double error(const PointsRef& x, const VecRef& target) const;
 
  private:

@@ -16,6 +16,7 @@ struct SignedSvd {
   Eigen::Vector3d sigma;  // |sigma_0| >= |sigma_1| >= |sigma_2|; only sigma_2 may be negative
 };
 
+// \return J = U diag(sigma) V^T as above.
 inline SignedSvd signed_svd(const Eigen::Matrix3d& J) {
   Eigen::Matrix3d B = J, V = Eigen::Matrix3d::Identity();
   for (int sweep = 0; sweep < 12; ++sweep) {

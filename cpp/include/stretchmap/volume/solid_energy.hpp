@@ -39,7 +39,8 @@ struct SolidElements {
 
 class SolidEnergy {
  public:
-  // boundary: needed where vertices glide. x (n, 3) is there to number rows by.
+  // \param x (n, 3) what rows are numbered by.
+  // \param boundary needed where vertices glide.
   SolidEnergy(const SolidElements& elements, const PointsRef& x, GlidingBoundary boundary = {});
 
   Index tets() const { return static_cast<Index>(tets_.rows()); }
@@ -47,28 +48,32 @@ class SolidEnergy {
   linalg::BlockMatrix pattern() const;  // of the Hessian, values zero
 
   // From now on J is multiplied by target^(-1/3): det J = 1 where a tet has `target` times the
-  // volume the rest matrix asks for. target (k) > 0, in the order of the tets given.
+  // volume the rest matrix asks for.
+  // \param target (k) > 0, in the order of the tets given.
   void set_targets(const VecRef& target);
 
+  // \param x (n, 3), here and below.
+  // \return energy +infinity where it is not defined.
   EnergyReport value(const PointsRef& x, const EnergyWeights& w) const;
 
-  // Gradient (rows, 3) and, unless null, Hessian, both in vertex frames.
+  // \param gradient (rows, 3) in vertex frames.
+  // \param hessian likewise, positive semi-definite; not computed if null.
   // \pre value(x, w).energy is finite.
-  void linearize(const PointsRef& x, const EnergyWeights& w, Points& gradient,
-                 linalg::BlockMatrix* hessian) const;
+  void model(const PointsRef& x, const EnergyWeights& w, Points& gradient,
+             linalg::BlockMatrix* hessian) const;
 
-  // x moved by alpha * step (rows, 3); gliding vertices stay on their surface.
+  // \return x moved by alpha * step (rows, 3); gliding vertices stay on their surface.
   Points move(const PointsRef& x, const PointsRef& step, double alpha) const;
 
-  // Largest alpha <= 1 for which no tet that is positive at x turns over along the straight line
-  // of the step, times 0.9.
+  // \return 0.9 times the largest alpha for which no tet that is positive at x turns over along the
+  //         straight line of the step, at most 1.
   double longest_step(const PointsRef& x, const PointsRef& step) const;
 
-  // The step, shortened at the vertices of those tets that would turn over first, so that a handful
-  // of them does not hold up all others.
+  // \return the step, shortened at the vertices of those tets that would turn over first, so that a
+  //         handful of them does not hold up all others.
   Points held_back(const PointsRef& x, const PointsRef& step) const;
 
-  // Three translations as seen from the vertex frames, (3 rows, 3).
+  // \return (3 rows, 3) three translations as seen from the vertex frames.
   Rows near_nullspace(const PointsRef& x) const;
 
  private:

@@ -9,10 +9,8 @@
 namespace stretchmap::volume {
 
 struct NewtonOptions {
-  double tol = 1e-2;     // relative residual asked of the conjugate gradients
-  int max_cg = 300;      // more are not spent on one step
-  double armijo = 1e-4;  // demanded share of the predicted decrease
-  int max_halvings = 20;
+  double tol = 1e-2;  // relative residual asked of the conjugate gradients
+  int max_cg = 300;   // more are not spent on one step
   // Keep the Hessian of the last step that was asked to renew it, and correct it by the changes of
   // the gradient since (limited-memory BFGS): several times cheaper, nearly as good while the
   // weights stay the same.
@@ -37,21 +35,22 @@ class SolidNewton {
   const SolidEnergy& energy() const { return energy_; }
 
   // SolidEnergy::set_targets between two steps.
+  // \param target (k) > 0.
   void set_targets(const VecRef& target) {
     energy_.set_targets(target);
     new_targets_ = true;
   }
 
-  // One inexact Newton step from x (n, 3), which it replaces. The energy never rises, and with
+  // One inexact Newton step. The energy never rises, and with
   // epsilon = 0 no tet turns over. A solve that breaks down, or whose direction does not lead down,
   // is tried again with a growing diagonal; if nothing helps, x stays and alpha is 0.
-  // \throws SolverError if the energy at x is not finite.
+  // \param x (n, 3) replaced.
+  // \throws Error "SolverError" if the energy at x is not finite.
   NewtonReport step(Points& x, const EnergyWeights& w, const NewtonOptions& options,
                     const Poll& poll = {});
 
  private:
-  bool search(Points& x, const Points& direction, const EnergyWeights& w,
-              const NewtonOptions& options, NewtonReport& report);
+  bool search(Points& x, const Points& direction, const EnergyWeights& w, NewtonReport& report);
   void try_double_step(Points& x, const Points& start, const Points& direction,
                        const EnergyWeights& w, NewtonReport& report) const;
   void try_held_back(Points& x, const Points& start, Points& direction, const EnergyWeights& w,

@@ -26,8 +26,8 @@ class TetLaplacian {
   // \pre tets index into [0, fixed.size()).
   TetLaplacian(const TetsRef& tets, const FlagsRef& fixed, const VecRef& rest, int lanes = 8);
 
-  // A matrix with the pattern of L_II, to be owned by a solver, values unset. Its rows are numbered
-  // for locality, see interior().
+  // \return a matrix with the pattern of L_II, to be owned by a solver, values unset. Its rows are
+  //         numbered for locality, see interior().
   SparseMatrix pattern() const;
 
   // Writes L_II into the values of `matrix` and -L_IB x_B into `rhs`, L being L_S of `geometry`
@@ -50,10 +50,11 @@ class TetLaplacian {
   std::vector<double> sums_;  // and one number per edge
 };
 
-// Volumetric stretch energy (5.1) at c = 0, 3/2 sum |f(tau)|^2 / |tau|; rest volumes positive.
+// \param rest_volumes (k) positive.
+// \return volumetric stretch energy (5.1) at c = 0, 3/2 sum |f(tau)|^2 / |tau|.
 double tet_stretch_energy(const VecRef& image_volumes, const VecRef& rest_volumes);
 
-// Gradient (n, 3) of tet_stretch_energy with respect to the image, 3 L_S(f) f.
+// \return (n, 3) gradient of tet_stretch_energy with respect to the image, 3 L_S(f) f.
 Points tet_stretch_gradient(const PointsRef& image, const TetsRef& tets,
                             const VecRef& rest_volumes);
 

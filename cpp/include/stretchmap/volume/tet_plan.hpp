@@ -37,7 +37,7 @@ struct TetPlan {
 
   Index rows() const { return static_cast<Index>(interior.size()); }
   Index chunks() const { return static_cast<Index>(chunk_slot.size()) - 1; }
-  // Of the plan, what assembly reads beyond tets and volumes.
+  // \return what assembly reads of the plan beyond tets and volumes.
   double index_bytes() const;
 };
 

@@ -11,17 +11,20 @@ namespace stretchmap::volume {
 
 class VolumetricStretch {
  public:
-  // rest_volumes (k) positive; fixed (n) marks the prescribed vertices; backend as in SpdOptions.
+  // \param fixed (n) marks the prescribed vertices.
+  // \param rest_volumes (k) positive.
+  // \param backend as in SpdOptions.
   // Image and rest volumes must be on the same scale for c of (5.6) to mean the same on every mesh.
   VolumetricStretch(const TetsRef& tets, const FlagsRef& fixed, const VecRef& rest_volumes,
                     std::string backend);
 
-  // Replaces the free rows of x (n, 3) by the harmonic extension of the prescribed ones; the
-  // Laplacian is that of the source positions (n, 3).
+  // \param source (n, 3) whose Laplacian it is.
+  // \param x (n, 3) its free rows are replaced by the harmonic extension of the prescribed ones.
   linalg::SolveReport harmonic(const PointsRef& source, Points& x,
                                const linalg::SolveOptions& options, const Poll& poll = {});
 
-  // One step of (5.5) with the regularization c >= 0 of (5.6), warm-started from x.
+  // One step of (5.5), warm-started from x.
+  // \param c >= 0 the regularization of (5.6).
   linalg::SolveReport step(Points& x, double c, const linalg::SolveOptions& options,
                            const Poll& poll = {});
 
