@@ -63,8 +63,8 @@ MatchModel assemble(const area::SurfaceChart& chart, const VecRef& weights,
 
 }  // namespace
 
-double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
-                   const RowsRef& rest, Index f) {
+double face_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                  const RowsRef& rest, Index f) {
   if (!(chart.edges(y, f).determinant() > 0.0)) return std::numeric_limits<double>::infinity();
   return area::triangle_value(mesh::plane_edges(X, chart.faces, f) * rest_of(rest, f));
 }
@@ -73,7 +73,7 @@ double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const P
                    const RowsRef& rest, const VecRef& weights) {
   double total = 0.0;
   for (Index f = 0; f < chart.faces.rows(); ++f) {
-    const double value = match_value(chart, y, X, rest, f);
+    const double value = face_value(chart, y, X, rest, f);
     if (!std::isfinite(value)) return value;
     total += weights[f] * value;
   }

@@ -53,7 +53,7 @@ class Search {
     double total = 0.0;
     for (const Index corner : corners_[i]) {
       const Index f = corner / 3;
-      total += weights_[f] * match_value(chart_, y_, X_, rest_, f);
+      total += weights_[f] * face_value(chart_, y_, X_, rest_, f);
       if (!std::isfinite(total)) return std::numeric_limits<double>::infinity();
     }
     return total;

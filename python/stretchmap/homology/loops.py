@@ -20,9 +20,8 @@ from ..base.arrays import as_integers, read_only
 from ..base.tables import HasSummary, table
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms
-from .files import save_basis
 from .integer import integer_inverse
-from .walks import shortest_in_class
+from .walks import save_loops, shortest_in_class
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
@@ -60,14 +59,6 @@ class HomologyBasis(HasSummary):
         where ``linking`` is.
     harmonic : HarmonicForms
         Harmonic representatives of ``dual_forms`` in cotangent weights.
-    torus_classes : ndarray, shape (2, 2), int64
-        Genus one only: classes of the longitude (row 0) and of the meridian (row 1). Of the
-        longitudes, which differ by meridians, the one that makes the flat torus least skew.
-    torus_matrix : ndarray, shape (2, 2), int64
-        Genus one only: ``torus_forms = torus_matrix @ dual_forms``.
-    torus_forms : ndarray, shape (2, e), int32
-        Genus one only: row 0 has period 1 on the longitude and 0 on the meridian, row 1 the other
-        way round; the integral of row 0 wedge row 1 over the outward surface is +1.
 
     Examples
     --------
@@ -94,6 +85,8 @@ class HomologyBasis(HasSummary):
     def torus_classes(self) -> NDArray[np.int64]:
         """(2, 2) classes of the longitude and of the meridian, over ``generators``.
 
+        Of the longitudes, which differ by meridians, the one that makes the flat torus least skew.
+
         Raises
         ------
         GenusError
@@ -113,7 +106,11 @@ class HomologyBasis(HasSummary):
 
     @cached_property
     def torus_forms(self) -> NDArray[np.int32]:
-        """(2, e) forms dual to longitude and meridian; raises as `torus_classes`."""
+        """(2, e) forms dual to longitude and meridian; raises as `torus_classes`.
+
+        Row 0 has period 1 on the longitude and 0 on the meridian, row 1 the other way round; the
+        integral of row 0 wedge row 1 over the outward surface is +1.
+        """
         return read_only((self.torus_matrix @ self.dual_forms).astype(np.int32))
 
     @cached_property
@@ -213,7 +210,13 @@ class HomologyBasis(HasSummary):
         known: tuple[NDArray[np.int32], ...],
         limit: float = math.inf,
     ) -> NDArray[np.int32]:
-        return shortest_in_class(self, target, known, limit)
+        crossing = [
+            loop.tolist()
+            for loop in (*known, *self.generators)
+            if self.classes(loop) @ self.intersection @ target
+        ]
+        first = min(crossing, key=len)
+        return shortest_in_class(self.surface, self.dual_forms, target, first, limit)
 
     def length(self, loop: ArrayLike) -> float:
         """Length of a closed polygon through vertices of the surface, in units of ``V``.
@@ -292,4 +295,12 @@ class HomologyBasis(HasSummary):
         OSError
             If the file cannot be written.
         """
-        save_basis(self, path)
+        families = {"generator": self.generators, "handle": self.handle_loops}
+        if self.tunnel_classes is not None:
+            families["tunnel"] = self.tunnel_loops
+        loops = {f"{name}_{i}": l for name, some in families.items() for i, l in enumerate(some)}
+        arrays: dict[str, NDArray[Any]] = {"dual_forms": self.dual_forms, **loops}
+        if self.genus == 1:
+            arrays.update(meridian=self.meridian, longitude=self.longitude)
+            arrays["torus_forms"] = self.torus_forms
+        save_loops(path, self.surface, arrays)

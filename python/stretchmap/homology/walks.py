@@ -1,40 +1,53 @@
-"""Shortest loops of edges in a homology class."""
+"""Loops of edges: the shortest of a homology class, and files of them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import read_only
+from ..base.files import atomic_path
+from ..base.options import as_path
+from ..errors import FileFormatError
+from ..io.npz import save_npz
 
 if TYPE_CHECKING:
-    from .loops import HomologyBasis
+    from ..mesh.meshes import TriMesh
 
-__all__ = ["shortest_in_class"]
+__all__ = ["save_loops", "shortest_in_class"]
 
 
 def shortest_in_class(
-    basis: HomologyBasis,
+    surface: TriMesh,
+    forms: NDArray[np.int32],
     target: NDArray[np.int64],
-    known: tuple[NDArray[np.int32], ...],
+    crossing: list[int],
     limit: float,
 ) -> NDArray[np.int32]:
     """Vertices of the shortest loop of a class, none if it is not shorter than the limit.
 
-    Every such loop crosses each loop whose intersection number with the class is not zero; the
-    search starts from the shortest of them among `known` and the generators.
+    The search starts from a loop whose intersection number with the class is not zero: every loop
+    of the class crosses it.
     """
-    top = basis.surface.topology
-    lengths = _core.mesh.edge_lengths(top, basis.surface.V)
-    crossing = [
-        loop.tolist()
-        for loop in (*known, *basis.generators)
-        if basis.classes(loop) @ basis.intersection @ target
-    ]
+    top = surface.topology
+    lengths = _core.mesh.edge_lengths(top, surface.V)
     loop = _core.homology.shortest_loop(
-        top, lengths, basis.dual_forms, target.astype(np.int32), min(crossing, key=len), limit
+        top, lengths, forms, target.astype(np.int32), crossing, limit
     )
     return read_only(np.array(loop, dtype=np.int32))
+
+
+def save_loops(
+    path: str | os.PathLike[str], surface: TriMesh, arrays: dict[str, NDArray[Any]]
+) -> None:
+    """Write a surface with its edges and further arrays as ``.npz``."""
+    path = as_path(path)
+    if path.suffix.lower() != ".npz":
+        raise FileFormatError(f"{path}: loops and forms are written as .npz")
+    arrays = {"V": surface.V, "F": surface.F, "edges": surface.edges, **arrays}
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        save_npz(file, arrays)

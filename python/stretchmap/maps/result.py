@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import read_only
-from ..base.options import flag, whole
+from ..base.options import as_path, flag, whole
 from ..base.tables import HasSummary, plain_dict, table, versions
 from ..base.torus import Torus
 from ..errors import OptionError
@@ -23,7 +23,7 @@ from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
 from .history import IterationRecord
 from .points import PointMap
-from .writing import elements, save_map
+from .writing import elements, fields, save_arrays, write_map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -242,8 +242,7 @@ class MapResult(HasSummary, Exchanged):
     def summary(self) -> str:
         """A table of the scalars."""
         rows = self.to_dict()
-        seconds = rows.pop("seconds")
-        torus = rows.pop("torus")
+        seconds, torus = rows.pop("seconds"), rows.pop("torus")
         certificate = rows.pop("certificate", None)
         rows.pop("versions")
         if torus is not None:
@@ -275,22 +274,26 @@ class MapResult(HasSummary, Exchanged):
         OSError
             If the file cannot be written.
         """
-        save_map(self, path)
+        path = as_path(path)
+        if path.suffix.lower() == ".npz":
+            save_arrays(path, self._arrays())
+        else:
+            write_map(path, self.as_cells(), self.mesh, self.image, self.angles)
 
     def as_cells(self) -> Cells:
         """The source with all fields of the map, as viewers and solvers take them."""
-        mesh, cells = self.mesh, elements(self.mesh)
-        points = {"image": self.image, "ring_ratio": self.distortion.ring_ratios}
-        ratios = {"ratio": self.distortion.ratios}
-        for name, array in self.extra_arrays().items():
-            if array.ndim in (1, 2) and array.dtype.kind in "biuf" and name not in points:
-                if len(array) == len(mesh.V):
-                    points[name] = array
-                elif len(array) == len(cells):
-                    ratios[name] = array
+        return fields(self.mesh, self.image, self.torus, self.distortion, self.extra_arrays())
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        arrays: dict[str, NDArray[Any]] = {
+            "V": self.mesh.V,
+            "T" if isinstance(self.mesh, TetMesh) else "F": elements(self.mesh),
+            "image": self.image,
+            "ratios": self.distortion.ratios,
+            "ring_ratios": self.distortion.ring_ratios,
+            **self.extra_arrays(),
+        }
         if self.torus is not None:
-            u, v, s = self.torus.coordinates(self.image)
-            points |= {"u": u, "v": v, "s": s, "cos_u": np.cos(u), "sin_u": np.sin(u)}
-            points |= {"cos_v": np.cos(v), "sin_v": np.sin(v)}
-        kind = "tetra" if isinstance(mesh, TetMesh) else "triangle"
-        return Cells(mesh.V, kind, cells, points, ratios)
+            arrays["torus"] = np.array([self.torus.R, self.torus.r])
+        arrays["meta"] = np.array(json.dumps(self.to_dict(history=True), allow_nan=False))
+        return arrays

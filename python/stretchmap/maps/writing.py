@@ -8,63 +8,75 @@ no file behind.
 
 from __future__ import annotations
 
-import json
-import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import io
 from ..base.files import atomic_path
-from ..base.options import as_path
-from ..base.torus import TWO_PI
+from ..base.torus import TWO_PI, Torus
 from ..io.npz import save_npz
+from ..measures.elements import Distortion
+from ..mesh.exchange import Cells
 from ..mesh.meshes import TetMesh, TriMesh
 
-if TYPE_CHECKING:
-    from .result import MapResult
-
-__all__ = ["corner_turns", "elements", "save_map"]
+__all__ = ["corner_turns", "elements", "fields", "save_arrays", "write_map"]
 
 
-def save_map(result: MapResult, path: str | os.PathLike[str]) -> None:
-    """As `MapResult.save`."""
-    path = as_path(path)
+def write_map(
+    path: Path,
+    given: Cells,
+    mesh: TriMesh | TetMesh,
+    image: NDArray[np.float64],
+    angles: NDArray[np.float64] | None,
+) -> None:
+    """Write a map to a file that is none of ours, see `MapResult.save`."""
     suffix = path.suffix.lower()
-    mesh, d = result.mesh, result.distortion
-    if suffix == ".npz":
-        _save_npz(result, path)
-    elif suffix in (".vtu", ".vtk", ".xdmf"):
-        given = result.as_cells()
+    if suffix in (".vtu", ".vtk", ".xdmf"):
         io.write(path, mesh, point_data=given.point_data, cell_data=given.cell_data)
     elif isinstance(mesh, TetMesh):
         if suffix in io.suffixes(solid=True):
-            io.write(path, TetMesh(result.image, mesh.T), cell_data={"ratio": d.ratios})
+            ratios = {"ratio": given.cell_data["ratio"]}
+            io.write(path, TetMesh(image, mesh.T), cell_data=ratios)
         else:
-            io.write(path, TriMesh(result.image[mesh.boundary_vertices], mesh.surface.F))
-    elif suffix == ".obj" and result.angles is not None:
-        io.write(path, mesh, corner_uv=corner_turns(mesh.F, result.angles))
+            io.write(path, TriMesh(image[mesh.boundary_vertices], mesh.surface.F))
+    elif suffix == ".obj" and angles is not None:
+        io.write(path, mesh, corner_uv=corner_turns(mesh.F, angles))
     else:
-        io.write(path, TriMesh(result.image, mesh.F), cell_data={"ratio": d.ratios})
+        io.write(path, TriMesh(image, mesh.F), cell_data={"ratio": given.cell_data["ratio"]})
 
 
-def _save_npz(result: MapResult, path: Path) -> None:
-    mesh = result.mesh
-    arrays: dict[str, NDArray[Any]] = {
-        "V": mesh.V,
-        "T" if isinstance(mesh, TetMesh) else "F": elements(mesh),
-        "image": result.image,
-        "ratios": result.distortion.ratios,
-        "ring_ratios": result.distortion.ring_ratios,
-        **result.extra_arrays(),
-    }
-    if result.torus is not None:
-        arrays["torus"] = np.array([result.torus.R, result.torus.r])
-    arrays["meta"] = np.array(json.dumps(result.to_dict(history=True), allow_nan=False))
+def save_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+    """Write an ``.npz`` that appears whole or not at all."""
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         save_npz(file, arrays)
+
+
+def fields(
+    mesh: TriMesh | TetMesh,
+    image: NDArray[np.float64],
+    torus: Torus | None,
+    measured: Distortion,
+    extra: dict[str, NDArray[Any]],
+) -> Cells:
+    """The source with all fields of a map."""
+    cells = elements(mesh)
+    points = {"image": image, "ring_ratio": measured.ring_ratios}
+    ratios = {"ratio": measured.ratios}
+    for name, array in extra.items():
+        if array.ndim in (1, 2) and array.dtype.kind in "biuf" and name not in points:
+            if len(array) == len(mesh.V):
+                points[name] = array
+            elif len(array) == len(cells):
+                ratios[name] = array
+    if torus is not None:
+        u, v, s = torus.coordinates(image)
+        points |= {"u": u, "v": v, "s": s, "cos_u": np.cos(u), "sin_u": np.sin(u)}
+        points |= {"cos_v": np.cos(v), "sin_v": np.sin(v)}
+    kind = "tetra" if isinstance(mesh, TetMesh) else "triangle"
+    return Cells(mesh.V, kind, cells, points, ratios)
 
 
 def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:

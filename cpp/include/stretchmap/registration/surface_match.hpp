@@ -15,8 +15,8 @@ namespace stretchmap::registration {
 // \param X (n, 3) points there.
 // \param rest (m, 4) inverse edge matrices as of rest_triangles.
 // \return phi of face f, +infinity if it is folded in the chart.
-double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
-                   const RowsRef& rest, Index f);
+double face_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
+                  const RowsRef& rest, Index f);
 
 // \param weights (m)
 // \return Psi, +infinity if a face is folded.
