@@ -54,8 +54,8 @@ if TYPE_CHECKING:
     from .conformal.map import conformal_map as conformal_map
     from .forms.harmonic import HarmonicForms as HarmonicForms
     from .forms.holomorphic import HolomorphicForms as HolomorphicForms
-    from .homology.basis import HomologyBasis as HomologyBasis
     from .homology.basis import homology_basis as homology_basis
+    from .homology.loops import HomologyBasis as HomologyBasis
     from .homology.representatives import harmonic_forms as harmonic_forms
     from .homology.representatives import holomorphic_forms as holomorphic_forms
     from .io.read_write import read as read
@@ -74,8 +74,8 @@ if TYPE_CHECKING:
     from .mesh.foreign import from_meshio as from_meshio
     from .mesh.foreign import from_pyvista as from_pyvista
     from .mesh.foreign import from_trimesh as from_trimesh
-    from .mesh.meshes import TetMesh as TetMesh
-    from .mesh.meshes import TriMesh as TriMesh
+    from .mesh.solids import TetMesh as TetMesh
+    from .mesh.surfaces import TriMesh as TriMesh
     from .mesh.tetrahedralize import tetrahedralize as tetrahedralize
     from .partitions.parts import Partition as Partition
     from .partitions.parts import partition as partition
@@ -102,8 +102,8 @@ _EXPORTS = {
     "Torus": "base.torus",
     "Progress": "base.progress",
     "threads": "base.threads",
-    "TetMesh": "mesh.meshes",
-    "TriMesh": "mesh.meshes",
+    "TetMesh": "mesh.solids",
+    "TriMesh": "mesh.surfaces",
     "Diagnosis": "mesh.diagnosis",
     "from_meshio": "mesh.foreign",
     "from_pyvista": "mesh.foreign",
@@ -117,7 +117,7 @@ _EXPORTS = {
     "HolomorphicForms": "forms.holomorphic",
     "Distortion": "measures.elements",
     "distortion": "measures.elements",
-    "HomologyBasis": "homology.basis",
+    "HomologyBasis": "homology.loops",
     "homology_basis": "homology.basis",
     "harmonic_forms": "homology.representatives",
     "holomorphic_forms": "homology.representatives",

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["HomologyBasis"]
 
-# The search for a shortest loop walks round as often as the class says.
-_MOST_TURNS = 100
+_MOST_TURNS = 100  # the search for a shortest loop walks round as often as the class says
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +82,7 @@ class HomologyBasis(HasSummary):
 
     @property
     def torus_classes(self) -> NDArray[np.int64]:
-        """(2, 2) classes of the longitude and of the meridian, over ``generators``.
-
-        Of the longitudes, which differ by meridians, the one that makes the flat torus least skew.
+        """(2, 2) classes of longitude and meridian over ``generators``; the longitude least skew.
 
         Raises
         ------
@@ -106,10 +103,9 @@ class HomologyBasis(HasSummary):
 
     @cached_property
     def torus_forms(self) -> NDArray[np.int32]:
-        """(2, e) forms dual to longitude and meridian; raises as `torus_classes`.
+        """(2, e) forms dual to longitude and meridian, their wedge product one in all.
 
-        Row 0 has period 1 on the longitude and 0 on the meridian, row 1 the other way round; the
-        integral of row 0 wedge row 1 over the outward surface is +1.
+        Raises as `torus_classes`.
         """
         return read_only((self.torus_matrix @ self.dual_forms).astype(np.int32))
 
@@ -215,8 +211,7 @@ class HomologyBasis(HasSummary):
             for loop in (*known, *self.generators)
             if self.classes(loop) @ self.intersection @ target
         ]
-        first = min(crossing, key=len)
-        return shortest_in_class(self.surface, self.dual_forms, target, first, limit)
+        return shortest_in_class(self.surface, self.dual_forms, target, crossing, limit)
 
     def length(self, loop: ArrayLike) -> float:
         """Length of a closed polygon through vertices of the surface, in units of ``V``.
@@ -246,13 +241,7 @@ class HomologyBasis(HasSummary):
         return as_integers(loop, "loop", (None,), 0, self.surface.n_vertices - 1)
 
     def require_torus(self) -> None:
-        """Check that the genus is one.
-
-        Raises
-        ------
-        GenusError
-            If it is not.
-        """
+        """Raise `GenusError` unless the genus is one."""
         _ = self.torus_classes
 
     def to_dict(self) -> dict[str, Any]:
@@ -295,9 +284,8 @@ class HomologyBasis(HasSummary):
         OSError
             If the file cannot be written.
         """
-        families = {"generator": self.generators, "handle": self.handle_loops}
-        if self.tunnel_classes is not None:
-            families["tunnel"] = self.tunnel_loops
+        tunnels = () if self.tunnel_classes is None else self.tunnel_loops
+        families = {"generator": self.generators, "handle": self.handle_loops, "tunnel": tunnels}
         loops = {f"{name}_{i}": l for name, some in families.items() for i, l in enumerate(some)}
         arrays: dict[str, NDArray[Any]] = {"dual_forms": self.dual_forms, **loops}
         if self.genus == 1:

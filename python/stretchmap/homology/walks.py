@@ -25,18 +25,18 @@ def shortest_in_class(
     surface: TriMesh,
     forms: NDArray[np.int32],
     target: NDArray[np.int64],
-    crossing: list[int],
+    crossing: list[list[int]],
     limit: float,
 ) -> NDArray[np.int32]:
     """Vertices of the shortest loop of a class, none if it is not shorter than the limit.
 
-    The search starts from a loop whose intersection number with the class is not zero: every loop
-    of the class crosses it.
+    The search starts from the shortest of `crossing`, loops whose intersection number with the class
+    is not zero: every loop of the class crosses them.
     """
     top = surface.topology
     lengths = _core.mesh.edge_lengths(top, surface.V)
     loop = _core.homology.shortest_loop(
-        top, lengths, forms, target.astype(np.int32), crossing, limit
+        top, lengths, forms, target.astype(np.int32), min(crossing, key=len), limit
     )
     return read_only(np.array(loop, dtype=np.int32))
 
