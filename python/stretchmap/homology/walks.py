@@ -30,8 +30,8 @@ def shortest_in_class(
 ) -> NDArray[np.int32]:
     """Vertices of the shortest loop of a class, none if it is not shorter than the limit.
 
-    The search starts from the shortest of `crossing`, loops whose intersection number with the class
-    is not zero: every loop of the class crosses them.
+    The search starts from the shortest of `crossing`, loops whose intersection number with the
+    class is not zero: every loop of the class crosses them.
     """
     top = surface.topology
     lengths = _core.mesh.edge_lengths(top, surface.V)
