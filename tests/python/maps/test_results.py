@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from stretchmap import TetMesh, Torus, certify, read, samples
+from stretchmap.base.files import atomic_path
+from stretchmap.base.tables import table
 from stretchmap.certificate.findings import Certificate
 from stretchmap.errors import FileFormatError, IndexRangeError, MeshError
 from stretchmap.maps.files import load_map
 from stretchmap.maps.history import IterationRecord
-from stretchmap.maps.result import MapResult, atomic_path, table
+from stretchmap.maps.result import MapResult
 
 REQUIRED = set(
     """
