@@ -359,7 +359,7 @@ def test_diagnosis_does_not_depend_on_labels_or_position(ring, seed, scale, shif
     )
 
 
-@pytest.mark.parametrize("scale", [1e-90, 1e-9, 1.0, 1e9, 1e90])
+@pytest.mark.parametrize("scale", [1e-90, 1e-9, 1.0, 1e9, 1e40])
 def test_flatness_is_relative(scale, ring):
     """A tet a ten-millionth as high as wide passes at any scale, one a 1e-14th does not."""
     flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1.0]])
