@@ -90,6 +90,31 @@ struct Polygon {
   std::vector<Run> runs;
 };
 
+// The segments of a run of one polygon against those of a run of the other.
+class SegmentPairs {
+ public:
+  SegmentPairs(const Polygon& first, const Polygon& second, const IndexVecRef& first_mark,
+               const IndexVecRef& second_mark)
+      : p_(first), q_(second), p_mark_(first_mark), q_mark_(second_mark) {}
+
+  bool count(const Polygon::Run& a, const Polygon::Run& b, Crossings& sum) const {
+    for (Index i = a.begin; i < a.end; ++i)
+      for (Index j = b.begin; j < b.end; ++j)
+        if (!marked(i, j) &&
+            !count_pair(p_.point(i), p_.point(p_.next(i)), q_.point(j), q_.point(q_.next(j)), sum))
+          return false;
+    return true;
+  }
+
+ private:
+  bool marked(Index i, Index j) const {
+    return p_mark_.size() > 0 && (p_mark_[i] == q_mark_[j] || p_mark_[i] == q_mark_[q_.next(j)]);
+  }
+
+  const Polygon &p_, &q_;
+  const IndexVecRef &p_mark_, &q_mark_;
+};
+
 }  // namespace
 
 Eigen::Matrix3d generic_rotation(int k) {
@@ -104,20 +129,7 @@ bool count_crossings(const Points& p, const Points& q, const IndexVecRef& p_mark
                      const IndexVecRef& q_mark, Crossings& sum, const Poll& poll) {
   if (p.rows() == 0 || q.rows() == 0) return true;
   const Polygon first(p), second(q);
-  const auto segments = [&](const Polygon::Run& a, const Polygon::Run& b) {
-    for (Index i = a.begin; i < a.end; ++i) {
-      for (Index j = b.begin; j < b.end; ++j) {
-        if (p_mark.size() > 0 && (p_mark[i] == q_mark[j] || p_mark[i] == q_mark[second.next(j)])) {
-          continue;
-        }
-        if (!count_pair(first.point(i), first.point(first.next(i)), second.point(j),
-                        second.point(second.next(j)), sum)) {
-          return false;
-        }
-      }
-    }
-    return true;
-  };
+  const SegmentPairs segments(first, second, p_mark, q_mark);
   std::vector<std::pair<Index, Index>> open{{0, 0}};
   for (std::int64_t done = 0; !open.empty(); ++done) {
     if (poll && done % 65536 == 65535) poll();
@@ -126,7 +138,7 @@ bool count_crossings(const Points& p, const Points& q, const IndexVecRef& p_mark
     const Polygon::Run &a = first.runs[i], &b = second.runs[j];
     if (!a.box.intersects(b.box)) continue;
     if (a.half < 0 && b.half < 0) {
-      if (!segments(a, b)) return false;
+      if (!segments.count(a, b, sum)) return false;
     } else if (b.half < 0 ||
                (a.half >= 0 && a.box.diagonal().squaredNorm() >= b.box.diagonal().squaredNorm())) {
       open.emplace_back(a.second, j);

@@ -35,21 +35,27 @@ struct BlockSolver::State {
 
 namespace {
 
+// Columns in range and ascending, the diagonal among them.
+bool row_is_sound(const BlockMatrix& A, Index i) {
+  const Index begin = A.row_ptr[i], end = A.row_ptr[i + 1];
+  if (begin > end || end > A.col.size()) return false;
+  bool diagonal = false;
+  Index last = -1;
+  for (Index e = begin; e < end; last = A.col[e++]) {
+    if (A.col[e] <= last || A.col[e] >= A.rows()) return false;
+    diagonal = diagonal || A.col[e] == i;
+  }
+  return diagonal;
+}
+
 void require_pattern(const BlockMatrix& A) {
   const Index n = A.rows();
   if (n < 0 || A.row_ptr[0] != 0 || A.row_ptr[n] != A.col.size() ||
       A.values.size() != 9 * A.col.size())
     throw Error("SolverError", "the arrays of the block matrix do not belong together");
   std::vector<Index> bad;
-  for (Index i = 0; i < n && bad.size() < 20; ++i) {
-    const Index begin = A.row_ptr[i], end = A.row_ptr[i + 1];
-    bool good = begin <= end && end <= A.col.size(), diagonal = false;
-    for (Index e = begin; good && e < end; ++e) {
-      good = A.col[e] >= 0 && A.col[e] < n && (e == begin || A.col[e - 1] < A.col[e]);
-      diagonal = diagonal || A.col[e] == i;
-    }
-    if (!good || !diagonal) bad.push_back(i);
-  }
+  for (Index i = 0; i < n && bad.size() < 20; ++i)
+    if (!row_is_sound(A, i)) bad.push_back(i);
   if (!bad.empty())
     throw Error("SolverError",
                 "block row " + std::to_string(bad[0]) +

@@ -17,17 +17,19 @@ double squared_distance_to_box(const Vector3d& p, const Array3d& low, const Arra
   return (low - p.array()).max(p.array() - high).max(0.0).square().sum();
 }
 
+bool neither_positive(double s, double t) { return s <= 0.0 && t <= 0.0; }
+
 // Barycentric coordinates of the point of triangle a b c closest to p, by the region of the plane
 // in which p lies.
 Vector3d closest_weights(const Vector3d& p, const Vector3d& a, const Vector3d& b,
                          const Vector3d& c) {
   const Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0.0 && d2 <= 0.0) return {1.0, 0.0, 0.0};
+  if (neither_positive(d1, d2)) return {1.0, 0.0, 0.0};
   const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0};
+  if (neither_positive(-d3, d4 - d3)) return {0.0, 1.0, 0.0};
   const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return {0.0, 0.0, 1.0};
+  if (neither_positive(-d6, d5 - d6)) return {0.0, 0.0, 1.0};
   const double at_c = d1 * d4 - d3 * d2, at_b = d5 * d2 - d1 * d6, at_a = d3 * d6 - d5 * d4;
   if (at_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
     const double t = d1 / (d1 - d3);

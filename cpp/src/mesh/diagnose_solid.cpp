@@ -48,14 +48,17 @@ void boundary(const PointsRef& points, const TetsRef& tets, const FacetGroups& f
   report.nonmanifold_vertices = surface.nonmanifold_vertices;
 }
 
-// A vertex is sound when the triangles opposite to it in its tets form a sphere or a disk. They
-// form a connected surface, perhaps pinched, whose Euler characteristic is 2 (inside) or 1 (on the
-// boundary) in just those cases, because handles and pinches only lower it.
-void vertex_links(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& edges,
-                  const Mask& skip, Index n_vertices, SolidDiagnosis& report, const Poll& poll) {
-  DisjointSets corners(static_cast<Index>(4 * tets.rows()));
-  IndexVec euler = IndexVec::Zero(n_vertices);
-  IndexVec expected = IndexVec::Constant(n_vertices, 2);
+// The triangles opposite to a vertex in its tets, for every vertex.
+struct Links {
+  DisjointSets corners;  // of tets, those connected across faces round their vertex
+  IndexVec euler;        // (n) Euler characteristic
+  IndexVec expected;     // (n) of a sphere, or of a disk on the boundary
+};
+
+Links vertex_links(const TetsRef& tets, const FacetGroups& faces, const FacetGroups& edges,
+                   const Mask& skip, Index n_vertices, const Poll& poll) {
+  Links links{DisjointSets(static_cast<Index>(4 * tets.rows())), IndexVec::Zero(n_vertices),
+              IndexVec::Constant(n_vertices, 2)};
   const auto corner_of = [&](Index t, Index v) {
     for (Index k = 0; k < 3; ++k) {
       if (tets(t, k) == v) return 4 * t + k;
@@ -67,27 +70,37 @@ void vertex_links(const TetsRef& tets, const FacetGroups& faces, const FacetGrou
     const Index first = faces.start[g], last = faces.start[g + 1];
     const Index h = faces.order[first];
     for (const Index v : half_face(tets, h)) {
-      --euler[v];
-      if (last - first == 1) expected[v] = 1;
+      --links.euler[v];
+      if (last - first == 1) links.expected[v] = 1;
       for (Index p = first + 1; p < last; ++p) {
-        corners.unite(corner_of(h / 4, v), corner_of(faces.order[p] / 4, v));
+        links.corners.unite(corner_of(h / 4, v), corner_of(faces.order[p] / 4, v));
       }
     }
   }
   for (Index t = 0; t < tets.rows(); ++t) {
     if (skip[t]) continue;
-    for (int k = 0; k < 4; ++k) ++euler[tets(t, k)];
+    for (int k = 0; k < 4; ++k) ++links.euler[tets(t, k)];
   }
   for (Index g = 0; g < edges.size(); ++g) {
     const Index h = edges.order[edges.start[g]];
-    for (const int k : kTetEdge[h % 6]) ++euler[tets(h / 6, k)];
+    for (const int k : kTetEdge[h % 6]) ++links.euler[tets(h / 6, k)];
   }
+  return links;
+}
+
+// A vertex is sound when its link is a sphere or a disk. It is a connected surface, perhaps
+// pinched, whose Euler characteristic is 2 (inside) or 1 (on the boundary) in just those cases,
+// because handles and pinches only lower it.
+void nonmanifold_vertices(const TetsRef& tets, const Mask& skip, Links links,
+                          SolidDiagnosis& report) {
+  const Index n_vertices = static_cast<Index>(links.euler.size());
   Mask unsound(n_vertices, 0), used(n_vertices, 0);
-  mark_split_corners(tets, skip, corners, unsound);
+  mark_split_corners(tets, skip, links.corners, unsound);
   for (Index t = 0; t < tets.rows(); ++t) {
     for (int k = 0; k < 4 && !skip[t]; ++k) used[tets(t, k)] = 1;
   }
-  for (Index i = 0; i < n_vertices; ++i) unsound[i] |= used[i] && euler[i] != expected[i];
+  for (Index i = 0; i < n_vertices; ++i)
+    unsound[i] |= used[i] && links.euler[i] != links.expected[i];
   for (const Index i : report.nonmanifold_vertices) unsound[i] = 1;
   for (const Index i : report.nonmanifold_edges.reshaped()) unsound[i] = 0;
   for (const Index i : report.nonmanifold_faces.reshaped()) unsound[i] = 0;
@@ -133,7 +146,8 @@ SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets, cons
   orientation(points, tets, faces, skip, report);
   rest();
   boundary(points, tets, faces, report);
-  vertex_links(tets, faces, edges, skip, n_vertices, report, poll);
+  nonmanifold_vertices(tets, skip, vertex_links(tets, faces, edges, skip, n_vertices, poll),
+                       report);
   rest();
   topology(tets, faces, edges, skip, n_vertices, report);
   return report;

@@ -85,23 +85,8 @@ STRETCHMAP_INLINE void lane_order(Lane* B, Lane* V, int p, int q) {
   }
 }
 
-STRETCHMAP_INLINE void lane_svd(const Lane* J, LaneSvd& out) {
-  alignas(64) Lane B[9];
-  for (int k = 0; k < 9; ++k)
-    for (int l = 0; l < kLanes; ++l) {
-      B[k][l] = J[k][l];
-      out.V[k][l] = k % 4 == 0 ? 1.0 : 0.0;
-    }
-  LaneSweep state;
-  for (int sweep = 0; sweep < 12 && state.next(); ++sweep) {
-    lane_rotate(B, out.V, 0, 1, state);
-    lane_rotate(B, out.V, 0, 2, state);
-    lane_rotate(B, out.V, 1, 2, state);
-  }
-  lane_order(B, out.V, 0, 1);
-  lane_order(B, out.V, 0, 2);
-  lane_order(B, out.V, 1, 2);
-
+// The singular values, and the left vectors as an orthonormal basis, from the ordered columns.
+STRETCHMAP_INLINE void lane_basis(const Lane* B, LaneSvd& out) {
   for (int l = 0; l < kLanes; ++l) {
     const double b0[3] = {B[0][l], B[1][l], B[2][l]}, b1[3] = {B[3][l], B[4][l], B[5][l]};
     const double s0 = std::sqrt(b0[0] * b0[0] + b0[1] * b0[1] + b0[2] * b0[2]);
@@ -129,6 +114,25 @@ STRETCHMAP_INLINE void lane_svd(const Lane* J, LaneSvd& out) {
     out.sigma[1][l] = rank_one ? 0.0 : s1;
     out.sigma[2][l] = n[0] * B[6][l] + n[1] * B[7][l] + n[2] * B[8][l];
   }
+}
+
+STRETCHMAP_INLINE void lane_svd(const Lane* J, LaneSvd& out) {
+  alignas(64) Lane B[9];
+  for (int k = 0; k < 9; ++k)
+    for (int l = 0; l < kLanes; ++l) {
+      B[k][l] = J[k][l];
+      out.V[k][l] = k % 4 == 0 ? 1.0 : 0.0;
+    }
+  LaneSweep state;
+  for (int sweep = 0; sweep < 12 && state.next(); ++sweep) {
+    lane_rotate(B, out.V, 0, 1, state);
+    lane_rotate(B, out.V, 0, 2, state);
+    lane_rotate(B, out.V, 1, 2, state);
+  }
+  lane_order(B, out.V, 0, 1);
+  lane_order(B, out.V, 0, 2);
+  lane_order(B, out.V, 1, 2);
+  lane_basis(B, out);
 }
 
 // Rotation of rows and columns p and q of the symmetric A that annihilates its entry (p, q).

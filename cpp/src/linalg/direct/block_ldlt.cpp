@@ -79,51 +79,78 @@ BlockLdlt<K>::BlockLdlt(const SparseMatrix& A)
   diagonal_.resize(order_.size());
 }
 
+namespace {
+
+// A block of the row being worked on, its columns padded.
+template <int K>
+auto columns(double* from) {
+  return Eigen::Map<Eigen::Matrix<double, kWorkBlock<K> / K, K>>(from);
+}
+
+// The block, which is zero afterwards.
+template <int K>
+Eigen::Matrix<double, K, K> take_block(double* from) {
+  const Eigen::Matrix<double, K, K> block = columns<K>(from).template topRows<K>();
+  std::fill_n(from, kWorkBlock<K>, 0.0);
+  return block;
+}
+
+// The elimination tree's paths from the entries of a row to its diagonal: what fills in.
+class RowPattern {
+ public:
+  explicit RowPattern(std::size_t n) : mark_(n, -1), path_(n), pattern_(n), end_(n) {}
+
+  void begin(Index k) {
+    mark_[k] = k;
+    top_ = end_;
+  }
+  void add(Index i, Index k, const std::vector<Index>& parent) {
+    std::size_t length = 0;
+    for (; mark_[i] != k; i = parent[i]) {
+      path_[length++] = i;
+      mark_[i] = k;
+    }
+    while (length > 0) pattern_[--top_] = path_[--length];
+  }
+  // The next column to be eliminated, -1 after the last.
+  Index next() { return top_ < end_ ? pattern_[top_++] : -1; }
+
+ private:
+  std::vector<Index> mark_, path_, pattern_;
+  std::size_t end_, top_ = 0;
+};
+
+}  // namespace
+
 // Row by row: each row of L solves a triangular system whose pattern is read off the tree.
 template <int K>
 void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
-  std::vector<Index> filled(start_.begin(), start_.end() - 1), mark(order_.size(), -1);
-  std::vector<Index> path(order_.size()), pattern(order_.size());
+  std::vector<Index> filled(start_.begin(), start_.end() - 1);
+  RowPattern pattern(order_.size());
   constexpr int kSize = kWorkBlock<K>, kColumn = kSize / K;
   std::vector<double> work(kSize * order_.size(), 0.0);
-  const auto take = [&](Index i) {  // a block out of the row
-    double* from = work.data() + kSize * static_cast<std::size_t>(i);
-    Block block;
-    for (int d = 0; d < K; ++d)
-      for (int c = 0; c < K; ++c) block(c, d) = from[kColumn * d + c];
-    std::fill_n(from, kSize, 0.0);
-    return block;
-  };
+  const auto at = [&](Index i) { return work.data() + kSize * static_cast<std::size_t>(i); };
   for (Index k = 0; k < n_; ++k) {
     if (poll && k % 256 == 0) poll();
-    mark[k] = k;
-    Index top = n_;
+    pattern.begin(k);
     const BlockRow<K> row(A, order_[k]);
     const Index width = K * row.size;
     for (Index e = 0; e < row.size; ++e) {
-      Index i = place_[row.column(e)];
+      const Index i = place_[row.column(e)];
       if (i > k) continue;
       for (int c = 0; c < K; ++c)
         for (int d = 0; d < K; ++d)
-          work[kSize * static_cast<std::size_t>(i) + kColumn * d + c] =
-              A.valuePtr()[row.first + c * width + K * e + d];
-      Index length = 0;
-      for (; mark[i] != k; i = parent_[i]) {
-        path[length++] = i;
-        mark[i] = k;
-      }
-      while (length > 0) pattern[--top] = path[--length];
+          at(i)[kColumn * d + c] = A.valuePtr()[row.first + c * width + K * e + d];
+      pattern.add(i, k, parent_);
     }
-    Block pivot = take(k);
-    for (; top < n_; ++top) {
-      const Index i = pattern[top];
-      Block y = take(i);  // becomes row block (k, i) of L D
+    Block pivot = take_block<K>(at(k));
+    for (Index i; (i = pattern.next()) >= 0;) {
+      Block y = take_block<K>(at(i));  // becomes row block (k, i) of L D
       for (int c = 1; c < K; ++c)
         for (int d = 0; d < c; ++d) y.col(c) -= unit_[i](c, d) * y.col(d);
       if (const Index count = filled[i] - start_[i]; count > 0) {
         double padded[kSize] = {};
-        for (int d = 0; d < K; ++d)
-          for (int c = 0; c < K; ++c) padded[kColumn * d + c] = y(c, d);
+        columns<K>(padded).template topRows<K>() = y;
         const auto subtract = K == 2 ? subtract_updates_2 : subtract_updates_3;
         subtract(work.data(), padded, row_.data() + start_[i], lower_[start_[i]].data(), count);
       }

@@ -98,18 +98,32 @@ struct Run {
     result.finite = result.finite && all_finite<K>(rr);
   }
 
+  // The goals; columns without a right-hand side are zero.
+  void begin(const Scalars<K>& bb, double tol) {
+    for (int k = 0; k < K; ++k) {
+      goal[k] = tol * tol * bb[k];
+      for (Index i = 0; bb[k] == 0.0 && i < system.n; ++i)
+        x[static_cast<std::size_t>(K) * i + k] = 0.0;
+    }
+  }
+
+  // p = z + beta p, with what keeps the directions conjugate.
+  void turn_direction(const Scalars<K>& rz, const Scalars<K>& rz_old) {
+    Scalars<K> beta{};
+    for (int k = 0; k < K; ++k) beta[k] = rz_old[k] == 0.0 ? 0.0 : rz[k] / rz_old[k];
+    turn<K>(system.n, beta, z.data(), p.data());
+  }
+
   // Steps until the recursive residual is at the goal, the budget is spent or something breaks.
   void iterate(int max_iter, const Poll& poll) {
-    Scalars<K> rz_old{};
+    Scalars<K> rz_old{};  // zero: the first direction is the preconditioned residual
     const Index n = system.n;
-    for (bool first = true; result.iterations < max_iter && !reached(); first = false) {
+    while (result.iterations < max_iter && !reached()) {
       if (poll) poll();
       system.precondition(r_f.data(), z.data());
       const Scalars<K> rz = dots<K>(n, r.data(), z.data());
       if (!(result.finite = all_finite<K>(rz))) return;
-      Scalars<K> beta{};
-      for (int k = 0; k < K; ++k) beta[k] = first || rz_old[k] == 0.0 ? 0.0 : rz[k] / rz_old[k];
-      turn<K>(n, beta, z.data(), p.data());
+      turn_direction(rz, rz_old);
       const Scalars<K> pq = system.apply(p.data(), q.data());
       if (!(result.finite = all_finite<K>(pq))) return;
       Scalars<K> alpha{};
@@ -149,11 +163,7 @@ PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVect
   for (std::vector<double>* vector : {&run.r, &run.q}) vector->resize(size);
   for (std::vector<float>* vector : {&run.r_f, &run.z}) vector->resize(size);
   if (!(run.result.finite = all_finite<K>(bb))) return run.result;
-  for (int k = 0; k < K; ++k) {
-    run.goal[k] = options.tol * options.tol * bb[k];
-    if (bb[k] == 0.0)
-      for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) x[K * i + k] = 0.0;
-  }
+  run.begin(bb, options.tol);
   // The recursive residual drifts from the true one; a restart from the true one closes the gap.
   run.true_residual();
   const Scalars<K> first = run.rr;

@@ -123,6 +123,17 @@ void Transfer<B, K>::set_patterns(const LevelMatrix<B>& A) {
   });
 }
 
+// to = scale * inverse * sum, a B x K block; `inverse` is column-major.
+template <int B, int K>
+void scaled_product(const float* inverse, const double* sum, double scale, float* to) {
+  for (int b = 0; b < B; ++b)
+    for (int k = 0; k < K; ++k) {
+      double value = 0.0;
+      for (int c = 0; c < B; ++c) value += inverse[B * c + b] * sum[K * c + k];
+      to[K * b + k] = static_cast<float>(scale * value);
+    }
+}
+
 template <int B, int K>
 void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
   constexpr size_t kSize = static_cast<size_t>(B) * K;
@@ -155,15 +166,8 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
         const double d = A.diagonal[i];
         scale = -damping * d / std::max(d + lumped, 0.1 * d) / (1.0 - A.excess[i]);
       }
-      for (Index s = 0; s < length; ++s) {
-        float* out = p_value.data() + kSize * (first + s);
-        for (int b = 0; b < B; ++b)
-          for (int k = 0; k < K; ++k) {
-            double value = 0.0;
-            for (int c = 0; c < B; ++c) value += inverse[B * c + b] * sum[kSize * s + K * c + k];
-            out[K * b + k] = static_cast<float>(scale * value);
-          }
-      }
+      for (Index s = 0; s < length; ++s)
+        scaled_product<B, K>(inverse, &sum[kSize * s], scale, &p_value[kSize * (first + s)]);
       if (of[i] >= 0) {
         float* out = p_value.data() + kSize * (first + slot[of[i]]);
         for (size_t k = 0; k < kSize; ++k)
