@@ -47,12 +47,13 @@ def conformal(
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
-    surface = common.surface_of(common.read_mesh(input, orient, compact))
+    mesh, fields = common.read_with_fields(input, orient, compact)
+    surface, fields = common.surface_with_fields(mesh, fields)
     watch.lap("read")
     with use_threads(threads):
         result = conformal_map(surface)
     watch.lap(**result.seconds)
-    conclude(result, output, json, quiet, watch)
+    conclude(result.with_fields(*fields), output, json, quiet, watch)
 
 
 def area(
@@ -91,12 +92,13 @@ def area(
         "phase": phase,
     }
     options = {name: value for name, value in options.items() if value is not None}
-    surface = common.surface_of(common.read_mesh(input, orient, compact))
+    mesh, fields = common.read_with_fields(input, orient, compact)
+    surface, fields = common.surface_with_fields(mesh, fields)
     watch.lap("read")
     with terminal(quiet) as bar:
         result = area_map(surface, **options, threads=threads, progress=bar)
     watch.lap(**result.seconds)
-    conclude(result, output, json, quiet, watch)
+    conclude(result.with_fields(*fields), output, json, quiet, watch)
 
 
 def certify(

@@ -115,10 +115,12 @@ def volume(
         ratio=parsed_ratio(ratio), phase=phase, tol=tol, vertex_exact=vertex_exact, refine=refine,
         solver=solver.value,
     )  # fmt: skip
-    solid = common.require_solid(common.read_mesh(input, orient, compact), input, "volume")
+    mesh, fields = common.read_with_fields(input, orient, compact)
+    solid = common.require_solid(mesh, input, "volume")
     if start is not None:
         route["start"] = resumed(solid, load_map(start), start)
         solid = route["start"].mesh
+        fields = route["start"].point_fields, route["start"].cell_fields
     watch.lap("read")
     with terminal(quiet) as bar:
         result = volume_map(
@@ -126,7 +128,7 @@ def volume(
             progress=bar, **route,
         )  # fmt: skip
     watch.lap(**result.seconds)
-    conclude(result, output, json, quiet, watch)
+    conclude(result.with_fields(*fields), output, json, quiet, watch)
     if result.method == "certified" and not result.certificate.certified:
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
         return 1
@@ -167,7 +169,8 @@ def fill(
 
     common.check_outputs(output, common.map_suffixes(), json, input)
     watch = common.Stopwatch()
-    solid = common.require_solid(common.read_mesh(input, orient, compact), input, "fill")
+    mesh, fields = common.read_with_fields(input, orient, compact)
+    solid = common.require_solid(mesh, input, "fill")
     image = prescribed_image(solid, boundary)
     watch.lap("read")
     with terminal(quiet) as bar:
@@ -176,7 +179,7 @@ def fill(
             threads=threads, progress=bar,
         )  # fmt: skip
     watch.lap(**result.seconds)
-    conclude(result, output, json, quiet, watch)
+    conclude(result.with_fields(*fields), output, json, quiet, watch)
     if not result.certificate.certified:
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
         return 1

@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,14 +21,17 @@ from ..errors import OptionError
 from ..measures.elements import Distortion, distortion
 from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
+from .fields import carried
 from .history import IterationRecord
 from .points import PointMap
-from .writing import elements, fields, save_arrays, write_map
+from .writing import all_fields, elements, save_arrays, write_map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["Kind", "MapResult"]
+
+_Map = TypeVar("_Map", bound="MapResult")
 
 # Of pictures, see `stretchmap.plot`.
 Kind = Literal[
@@ -58,6 +61,8 @@ class MapResult(HasSummary, Exchanged):
         Why the iterations ended, in words.
     seconds : dict
         Wall-clock time per stage.
+    point_fields, cell_fields : dict of str to ndarray
+        Fields of the input by name, see `with_fields`; they go into every file.
 
     Examples
     --------
@@ -83,6 +88,8 @@ class MapResult(HasSummary, Exchanged):
     converged: bool
     stop_reason: str
     seconds: Mapping[str, float]
+    point_fields: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
+    cell_fields: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
 
     @property
     def title(self) -> str:
@@ -118,6 +125,29 @@ class MapResult(HasSummary, Exchanged):
         import stretchmap  # the front door loads pictures when they are asked for
 
         return stretchmap.plot.picture(self, kind, **options)
+
+    def with_fields(
+        self: _Map,
+        point_data: Mapping[str, ArrayLike] | None = None,
+        cell_data: Mapping[str, ArrayLike] | None = None,
+    ) -> _Map:
+        """The map with fields of its input, which its files and frames then carry.
+
+        Parameters
+        ----------
+        point_data, cell_data : mapping of str to array_like
+            Rows as the input's vertices and elements, or as those of ``mesh``. Where the input was
+            refined, a tet has the values of the tet it is a part of, an added vertex the mean of
+            its parents or, of whole numbers, the value of the first.
+
+        Raises
+        ------
+        ArrayError
+            Another number of rows, or no numbers.
+        """
+        refinement = getattr(self, "refinement", None)
+        points, cells = carried(self.mesh, refinement, point_data, cell_data)
+        return dataclasses.replace(self, point_fields=points, cell_fields=cells)
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """Further arrays to be kept in a map file, by name."""
@@ -262,10 +292,11 @@ class MapResult(HasSummary, Exchanged):
             ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``, ``.xdmf``: the source
             mesh; as point data ``image``, ``ring_ratio`` and, on a torus, ``u``, ``v``, ``s`` with
             ``cos_u``, ``sin_u``, ``cos_v``, ``sin_v``, which have no seam where the angles start
-            anew; as cell data ``ratio`` and, of a refined solid, ``parent_tet``. ``.obj`` of a
-            surface with angles: the source with (u, v) in turns as texture coordinates. The other
-            formats of :func:`stretchmap.write` hold no arrays and get the image itself, of a solid
-            where they can hold one and of its surface where not.
+            anew, and ``torus`` (R and r in every row); as cell data ``ratio`` and, of a refined
+            solid, ``parent_tet``; further the fields of the input. :func:`load_map` reads them,
+            too. ``.obj`` of a surface with angles: the source with (u, v) in turns as texture
+            coordinates. The other formats of :func:`stretchmap.write` hold no arrays and get the
+            image itself, of a solid where they can hold one and of its surface where not.
 
         Raises
         ------
@@ -282,7 +313,10 @@ class MapResult(HasSummary, Exchanged):
 
     def as_cells(self) -> Cells:
         """The source with all fields of the map, as viewers and solvers take them."""
-        return fields(self.mesh, self.image, self.torus, self.distortion, self.extra_arrays())
+        d = self.distortion
+        points = {"image": self.image, "ring_ratio": d.ring_ratios, **self.point_fields}
+        cells = {"ratio": d.ratios, **self.cell_fields}
+        return all_fields(self.mesh, self.torus, points, cells, self.extra_arrays())
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         arrays: dict[str, NDArray[Any]] = {
@@ -292,6 +326,8 @@ class MapResult(HasSummary, Exchanged):
             "ratios": self.distortion.ratios,
             "ring_ratios": self.distortion.ring_ratios,
             **self.extra_arrays(),
+            **{f"point:{name}": array for name, array in self.point_fields.items()},
+            **{f"cell:{name}": array for name, array in self.cell_fields.items()},
         }
         if self.torus is not None:
             arrays["torus"] = np.array([self.torus.R, self.torus.r])

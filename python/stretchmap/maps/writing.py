@@ -18,11 +18,10 @@ from .. import io
 from ..base.files import atomic_path
 from ..base.torus import TWO_PI, Torus
 from ..io.npz import save_npz
-from ..measures.elements import Distortion
 from ..mesh.exchange import Cells
 from ..mesh.meshes import TetMesh, TriMesh
 
-__all__ = ["corner_turns", "elements", "fields", "save_arrays", "write_map"]
+__all__ = ["all_fields", "corner_turns", "elements", "save_arrays", "write_map"]
 
 
 def write_map(
@@ -54,17 +53,15 @@ def save_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
         save_npz(file, arrays)
 
 
-def fields(
+def all_fields(
     mesh: TriMesh | TetMesh,
-    image: NDArray[np.float64],
     torus: Torus | None,
-    measured: Distortion,
+    points: dict[str, NDArray[Any]],
+    ratios: dict[str, NDArray[Any]],
     extra: dict[str, NDArray[Any]],
 ) -> Cells:
-    """The source with all fields of a map."""
+    """The source with the fields given, further arrays of as many rows, and coordinates."""
     cells = elements(mesh)
-    points = {"image": image, "ring_ratio": measured.ring_ratios}
-    ratios = {"ratio": measured.ratios}
     for name, array in extra.items():
         if array.ndim in (1, 2) and array.dtype.kind in "biuf" and name not in points:
             if len(array) == len(mesh.V):
@@ -72,9 +69,10 @@ def fields(
             elif len(array) == len(cells):
                 ratios[name] = array
     if torus is not None:
-        u, v, s = torus.coordinates(image)
+        u, v, s = torus.coordinates(points["image"])
         points |= {"u": u, "v": v, "s": s, "cos_u": np.cos(u), "sin_u": np.sin(u)}
         points |= {"cos_v": np.cos(v), "sin_v": np.sin(v)}
+        points["torus"] = np.tile([torus.R, torus.r], (len(mesh.V), 1))
     kind = "tetra" if isinstance(mesh, TetMesh) else "triangle"
     return Cells(mesh.V, kind, cells, points, ratios)
 
