@@ -52,7 +52,10 @@ SemStep SurfaceSem::step() {
   Rows right = -product;
   right.row(0).setZero();
   Rows direction = Rows::Zero(right.rows(), 2);
-  solver_->solve(right, direction);
+  // Whatever comes of it is a direction of descent or not taken.
+  linalg::SolveOptions options;
+  options.must_converge = false;
+  solver_->solve(right, direction, options);
   SemStep result;
   result.residual = 2.0 * (product * periods_.asDiagonal()).norm();
   result.step = line_search(direction);

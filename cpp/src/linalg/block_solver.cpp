@@ -139,7 +139,7 @@ SolveReport BlockSolver::solve(const PointsRef& b, Eigen::Ref<Points> x,
   report.converged = !report.negative_curvature && report.residual[0] <= options.tol;
   if (!report.converged && !report.negative_curvature && options.must_converge)
     throw Error("SolverError", "the block solve stopped at a relative residual of " +
-                                   std::to_string(report.residual[0]) + " after " +
+                                   scientific(report.residual[0]) + " after " +
                                    std::to_string(report.iterations) + " iterations");
   return report;
 }

@@ -175,7 +175,7 @@ SolveReport SpdSolver::solve(const RowsRef& B, Eigen::Ref<Rows> X, const SolveOp
   report.converged = (report.residual.array() <= options.tol).all();
   if (!report.converged && options.must_converge)
     throw Error("SolverError", "the linear solve stopped at a relative residual of " +
-                                   std::to_string(report.residual.maxCoeff()) + " after " +
+                                   scientific(report.residual.maxCoeff()) + " after " +
                                    std::to_string(report.iterations) + " iterations");
   return report;
 }

@@ -1,6 +1,7 @@
 // Exceptions of the core. `kind` names the Python class the bindings raise (stretchmap.errors).
 #pragma once
 
+#include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -17,5 +18,12 @@ class Error : public std::runtime_error {
   std::string kind;        // "NonManifoldError", "SolverError", ...
   std::vector<Index> ids;  // offending vertices, faces or tets
 };
+
+// A number for a message, with its order of magnitude.
+inline std::string scientific(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.1e", value);
+  return text;
+}
 
 }  // namespace stretchmap
