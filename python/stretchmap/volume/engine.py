@@ -38,7 +38,7 @@ _log = logging.getLogger("stretchmap")
 
 _START_TOL = 1e-4
 _ROUNDS = 12
-_RINGS = (2, 4)  # reach of the patches, to begin with and in later rounds
+_RINGS = (2, 4)  # reach of the patches, to begin with and where that does not help
 # Inverted tets: with a larger share of all, it is not a matter of single places.
 _MOST_STUCK = 0.05
 # Times the fewest so far, and so many more: halving breeds more than it cures.
@@ -144,30 +144,27 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     """Inverted tets, and tets at folded faces, that are left."""
     history = run.history
     run.x = untangle_whole(history.model, run.x, history, glide=False).x
+    stuck = _patched(run, glide=False)
     if glide:
         run.x = untangle_whole(history.model, run.x, history, glide=True).x
-    stuck = stuck_tets(history.model, run.x, glide=glide)
+        stuck = _patched(run, glide=True)
     best, fewest = run.problem, len(stuck)
-    for done in range(_ROUNDS):
-        many = len(stuck) > _MOST_STUCK * run.problem.solid.n_tets
-        if not len(stuck) or many or history.budget.spent:
+    for _ in range(_ROUNDS):
+        if not len(stuck) or run.problem.refinement is None or history.budget.spent:
             break
-        run.x = untangle_patches(
-            history.model, run.x, stuck, rings=_RINGS[done > 0], glide=glide, budget=history.budget
-        )
-        stuck = stuck_tets(history.model, run.x, glide=glide)
+        if len(stuck) > min(_MOST_STUCK * run.problem.solid.n_tets, _TIMES * fewest + _MORE):
+            break
+        if not len(stuck_tets(history.model, run.x, glide=False)):
+            break  # folded faces are left, which more vertices inside do not unfold
+        n = run.problem.solid.n_vertices
+        run.take(run.problem.halved(crowded_edges(run.problem.solid, stuck)))
+        _log.info(
+            "%d inverted tets are stuck: %d edges round them halved",
+            len(stuck), run.problem.solid.n_vertices - n,
+        )  # fmt: skip
+        stuck = _patched(run, glide=glide)
         if len(stuck) < fewest:
             best, fewest = run.problem, len(stuck)
-        elif len(stuck) > _TIMES * fewest + _MORE:
-            break
-        if len(stuck) and run.problem.refinement is not None:
-            n = run.problem.solid.n_vertices
-            run.take(run.problem.halved(crowded_edges(run.problem.solid, stuck)))
-            _log.info(
-                "%d inverted tets are stuck: %d edges round them halved",
-                len(stuck), run.problem.solid.n_vertices - n,
-            )  # fmt: skip
-            stuck = stuck_tets(history.model, run.x, glide=glide)
     if fewest and len(stuck):
         run.take(best)
         inverted = len(stuck_tets(history.model, run.x, glide=False))
@@ -179,6 +176,25 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     if not away.left and not len(stuck_tets(history.model, away.x, glide=glide)):
         run.x = away.x
     return 0
+
+
+def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
+    """Untangle patches, small ones and then larger, as long as that helps; tets that are left."""
+    model, budget = run.history.model, run.history.budget
+    stuck = stuck_tets(model, run.x, glide=glide)
+    rings = iter(_RINGS)
+    reach = next(rings)
+    while 0 < len(stuck) <= _MOST_STUCK * len(model.T) and not budget.spent:
+        x = untangle_patches(model, run.x, stuck, rings=reach, glide=glide, budget=budget)
+        left = stuck_tets(model, x, glide=glide)
+        if len(left) < len(stuck):
+            run.x, stuck = x, left
+            continue
+        larger = next(rings, None)
+        if larger is None:
+            break
+        reach = larger
+    return stuck
 
 
 def _hold_folded(run: _Run) -> None:

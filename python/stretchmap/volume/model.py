@@ -20,6 +20,7 @@ __all__ = ["Budget", "History", "SolidModel", "face_areas"]
 
 FREE, FIXED, GLIDING = 0, 1, 2
 _LEAST_SECONDS, _MARGIN = 4.0, 0.9  # a stage under way is ended
+_THICK = 0.01  # of a tet that is none too flat: volume over its mean edge cubed; regular: 0.118
 _REACH = 8.0  # factor up to which the volume next to a boundary face may be off what it expects
 
 
@@ -92,6 +93,29 @@ class SolidModel:
         return local
 
     @cached_property
+    def roomy_volumes(self) -> NDArray[np.float64]:
+        """`local_volumes`, but of a sliver what its edges would leave room for: (k,).
+
+        A sliver is turned by making it thicker. In units of its own volume, which may be a
+        billionth of that, its determinant means nothing and its energy drowns that of all others.
+        """
+        corners = self.V[self.T]
+        squares = [
+            ((corners[:, a] - corners[:, b]) ** 2).sum(axis=1)
+            for a, b in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+        ]
+        room = _THICK * np.mean(squares, axis=0) ** 1.5
+        volumes = _core.volume.signed_tet_volumes(self.V, self.T)
+        roomy: NDArray[np.float64] = self.local_volumes * np.maximum(room / volumes, 1.0)
+        return roomy
+
+    @cached_property
+    def roomy_weights(self) -> NDArray[np.float64]:
+        """`weights` by these volumes: (k,)."""
+        weights = np.sqrt(self.shares * self.roomy_volumes / self.local_volumes)
+        return np.asarray(weights / weights.sum())
+
+    @cached_property
     def targets(self) -> NDArray[np.float64]:
         """Volume to ask of each tet behind a held boundary, relative to its share: (k,).
 
@@ -136,13 +160,19 @@ class SolidModel:
         moving = self.motion(glide=True) == GLIDING
         return np.flatnonzero(moving[self.faces].any(axis=1))
 
-    def newton(self, x: NDArray[np.float64], *, glide: bool) -> _core.volume.SolidNewton:
-        """The minimizer of the distortion of all tets, started near ``x``."""
+    def newton(
+        self,
+        x: NDArray[np.float64],
+        *,
+        glide: bool,
+        weights: NDArray[np.float64] | None = None,
+    ) -> _core.volume.SolidNewton:
+        """The minimizer of the distortion of all tets, started near ``x``; `weights` by default."""
         return _core.volume.SolidNewton(
             x,
             tets=self.T,
             rest=self.rest,
-            weights=self.weights,
+            weights=self.weights if weights is None else weights,
             motion=self.motion(glide=glide),
             boundary=self.gliding(self.faces[self.gliding_faces]) if glide else None,
         )

@@ -70,12 +70,12 @@ class FillOptions:
     max_aspect: float = 6.0
     floor: float = 0.02
     untangle_iter: int = 400
-    frozen_iter: int = 150
+    frozen_iter: int = 400
     patience: int = 30
     frozen_tol: float = 5e-4
     frozen_weight: float = 10.0
     face_weight: float = 1.0
-    glide_iter: int = 200
+    glide_iter: int = 500
     glide_tol: float = 2e-3
     shared: int = 5
     cg_tol: float = 0.1

@@ -133,8 +133,8 @@ def untangle_whole(
         Whether the boundary may glide; then folded boundary faces are unfolded, too.
     """
     o = model.options
-    newton = model.newton(x, glide=glide)
-    newton.set_targets(model.local_volumes)
+    newton = model.newton(x, glide=glide, weights=model.roomy_weights)
+    newton.set_targets(model.roomy_volumes)
     # Gliding is a matter of the whole boundary.
     few = 0 if glide else max(_FEW, int(_FEW_SHARE * len(model.T)))
 
@@ -263,7 +263,7 @@ def untangle_patches(
             faces = model.faces[moving[model.faces].any(axis=1)]
             if len(faces):
                 boundary = model.gliding(faces, number)
-        weights = model.weights[patch.tets]
+        weights = model.roomy_weights[patch.tets]
         start = np.ascontiguousarray(x[patch.vertices])
         newton = _core.volume.SolidNewton(
             start,
@@ -273,7 +273,7 @@ def untangle_patches(
             motion=patch.motion.astype(np.uint8),
             boundary=boundary,
         )
-        newton.set_targets(model.local_volumes[patch.tets])
+        newton.set_targets(model.roomy_volumes[patch.tets])
         done = _continue(
             newton,
             start,
