@@ -144,6 +144,7 @@ PARAMETERS: dict[str, Parameter] = {
     "spread": ("share", _value(1.0)),
     "vertebra_population.seed": ("seed", _value(1)),
     "max_cut": ("share", _value(0.25)),
+    "filler": ("word", _value("auto")),
     "spacing": ("array", _value((1.0, 1.0, 1.0))),
     # arrays
     "image": ("array", lambda s: s.solid.V),

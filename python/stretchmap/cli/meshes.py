@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,6 +10,14 @@ import typer
 
 from . import common
 from .common import Compact, Input, Json, Orient, Output, Quiet
+
+
+class Filler(str, Enum):
+    """Values of ``--filler``."""
+
+    auto = "auto"
+    tetgen = "tetgen"
+    ftetwild = "ftetwild"
 
 
 def register(app: typer.Typer) -> None:
@@ -129,6 +138,9 @@ def prepare(
         tuple[float, float, float] | None,
         typer.Option(metavar="X Y Z", help="Of voxels, if the file names none."),
     ] = None,
+    filler: Annotated[
+        Filler, typer.Option(help="What fills with tets; by default what is installed.")
+    ] = Filler.auto,
     json: Json = None,
     quiet: Quiet = False,
 ) -> None:
@@ -159,7 +171,7 @@ def prepare(
     with terminal(quiet) as bar:
         done = prepare_surface(
             given, faces=faces, genus=genus, max_cut=max_cut, progress=bar,
-            spacing=steps or (1.0, 1.0, 1.0),
+            spacing=steps or (1.0, 1.0, 1.0), filler=filler.value,
         )  # fmt: skip
     common.write_together(output, done.save, json, done.to_dict())
     if not quiet:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,11 @@ from ..mesh.tetrahedralize import tetrahedralize
 from .even import even
 from .handles import HandleCut, cut_handles
 from .holes import close_holes, crossings, remove_crossings
+from .rebuild import rebuilt
 from .report import Preparation, Step
 from .soup import Faces, Points, keep_largest, part_sheets, weld
 from .voxels import mask_surface
+from .wild import chosen_filler, fill_within_envelope, has_ftetwild
 
 __all__ = ["prepare"]
 
@@ -30,6 +33,7 @@ _WORKING_FACES = 50_000  # handles are looked for on no more than about that man
 _WORKING_ITERATIONS = 3
 _TET = 2.0  # largest tet, in regular tets over the boundary's mean edge
 _REMESHINGS = 3
+_REBUILT_FACES = 16_000
 _BYTES_PER_FACE = 5e3  # of the boundary, tets included; measured
 
 
@@ -40,12 +44,14 @@ def prepare(
     genus: int = 1,
     max_cut: float = 0.25,
     spacing: Sequence[float] = (1.0, 1.0, 1.0),
+    filler: Literal["auto", "tetgen", "ftetwild"] = "auto",
     progress: Progress | None = None,
 ) -> Preparation:
     """Make a solid that can be mapped from a raw surface or a voxel mask.
 
     Vertices are welded, sheets that touch parted, faces oriented, debris dropped, holes closed,
-    self-intersections cut out and refilled, surplus handles cut along their shortest loops, the
+    self-intersections cut out and refilled or, where that does not help, the surface rebuilt from
+    the voxels it winds round, surplus handles cut along their shortest loops, the
     surface remeshed to even triangles and filled with tets.
 
     Parameters
@@ -62,6 +68,11 @@ def prepare(
         surface. What is longer is taken for part of the shape.
     spacing : three floats
         Distance of voxels along each axis of a mask.
+    filler : {"auto", "tetgen", "ftetwild"}
+        What fills with tets: TetGen (package tetgen, AGPL) keeps the even surface as it is,
+        fTetWild (package pytetwild, MPL 2.0) stays within 1 / 2000 of the size of it. By
+        default TetGen where it is installed, and fTetWild where it is not, or where no even surface
+        can be had that does not cross itself.
     progress : Progress, optional
         Called at the start of every step.
 
@@ -84,7 +95,7 @@ def prepare(
     SolverError
         Remeshing or filling failed.
     MissingDependencyError
-        ``gpytoolbox`` or ``tetgen`` is not installed.
+        ``gpytoolbox``, or both ``tetgen`` and ``pytetwild``, are not installed.
 
     Examples
     --------
@@ -99,10 +110,11 @@ def prepare(
     max_cut = options.real("max_cut", max_cut, 0.0)
     options.memory(f"a surface of {faces} faces and its tets", _BYTES_PER_FACE * faces)
     options.callback("progress", progress)
+    filler = options.one_of("filler", filler, ("auto", "tetgen", "ftetwild"))
     steps = as_reals(spacing, "spacing", (3,))
     if (steps <= 0.0).any():
         raise OptionError(f"spacing must be three positive numbers, got {steps.tolist()}")
-    run = _Run(progress)
+    run = _Run(progress, chosen_filler(filler), filler == "auto" and has_ftetwild())
     if isinstance(surface, np.ndarray):
         V, F = run.arrays("mask", mask_surface, surface, steps)
     else:
@@ -119,8 +131,7 @@ def prepare(
         closed = run.coarsen(closed, max(_WORKING_FACES, 2 * faces))
     sound = run.uncross(closed)
     whole, cuts = run.cut(sound, genus, max_cut)
-    boundary = run.remesh(whole, faces)
-    solid = run.fill(boundary)
+    solid = run.fill(*run.remesh(whole, faces))
     if solid.surface.genus != genus:
         raise GenusError(f"the solid has genus {solid.surface.genus}, {genus} was wanted")
     solid.require_solid_torus() if genus == 1 else solid.diagnose().require()
@@ -130,8 +141,9 @@ def prepare(
 class _Run:
     """The steps, each timed, counted and announced."""
 
-    def __init__(self, progress: Progress | None) -> None:
+    def __init__(self, progress: Progress | None, filler: str, rescue: bool) -> None:
         self.steps: list[Step] = []
+        self._filler, self._rescue = filler, rescue  # rescue: fTetWild may help where others fail
         self._progress = progress
         self._start = time.perf_counter()
 
@@ -156,7 +168,13 @@ class _Run:
 
     def uncross(self, surface: TriMesh) -> TriMesh:
         self.announce("crossings")
-        sound, counts = remove_crossings(surface)
+        try:
+            sound, counts = remove_crossings(surface)
+        except SelfIntersectionError:
+            sound = rebuilt(surface, 0.5 * _edge_of(surface, _REBUILT_FACES))
+            if len(crossings(sound)) or not sound.diagnose().ok:
+                raise
+            counts = {"crossing": len(crossings(surface)), "faces_rebuilt": sound.n_faces}
         self.done("crossings", counts)
         return sound
 
@@ -169,34 +187,60 @@ class _Run:
         self.done("handles", {f"{kind}s_cut": kinds.count(kind) for kind in ("handle", "tunnel")})
         return whole, cuts
 
-    def remesh(self, surface: TriMesh, faces: int) -> TriMesh:
-        """Even triangles that do not cross; what does is cut out and the rest remeshed again."""
+    def remesh(self, surface: TriMesh, faces: int) -> tuple[TriMesh, float, bool]:
+        """Even triangles that do not cross, their edge length, and whether there are any.
+
+        What crosses is cut out and the rest remeshed again.
+        """
         self.announce("remesh")
-        removed = 0
+        removed, before = 0, surface
         for _ in range(_REMESHINGS):
             smooth = even(surface, faces)
             if not len(crossings(smooth)):
                 self.done("remesh", {"faces": smooth.n_faces, "crossing_faces_removed": removed})
-                return smooth
-            mended, counts = remove_crossings(smooth)
+                return smooth, _mean_edge(smooth), True
+            try:
+                mended, counts = remove_crossings(smooth)
+            except SelfIntersectionError:
+                break
             removed += counts["removed"]
             if mended.genus != surface.genus:
                 break
             surface = mended
-        if mended.genus == surface.genus:
+        else:
             self.done("remesh", {"faces": mended.n_faces, "crossing_faces_removed": removed})
-            return mended
-        raise SelfIntersectionError(
-            f"with {faces} faces the surface crosses itself where it is thin; ask for more faces"
-        )
+            return mended, _mean_edge(mended), True
+        if not self._rescue and self._filler != "ftetwild":
+            raise SelfIntersectionError(
+                f"with {faces} faces the surface crosses itself where it is thin; ask for more "
+                "faces, or install pytetwild, which fills it all the same"
+            )
+        self.done("remesh", {"given_up": 1})
+        return before, _edge_of(before, faces), False
 
-    def fill(self, surface: TriMesh) -> TetMesh:
+    def fill(self, surface: TriMesh, edge: float, is_even: bool) -> TetMesh:
+        """Tets inside, whose boundary edges are about so long."""
         self.announce("fill")
-        edges = surface.V[surface.edges]
-        edge = float(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).mean())
-        try:
-            solid = tetrahedralize(surface, _TET * edge**3 / (6.0 * 2.0**0.5))
-        except SolverError as error:
-            raise SolverError(f"{error}; ask for more faces", error.ids) from error
-        self.done("fill", {"tets": solid.n_tets})
+        solid = None
+        if is_even and self._filler == "tetgen":
+            try:
+                solid = tetrahedralize(surface, _TET * edge**3 / (6.0 * 2.0**0.5))
+            except SolverError as error:
+                if not self._rescue:
+                    raise SolverError(f"{error}; ask for more faces", error.ids) from error
+        if solid is None:
+            solid = fill_within_envelope(surface, edge)
+            self.done("fill", {"tets_by_ftetwild": solid.n_tets})
+        else:
+            self.done("fill", {"tets": solid.n_tets})
         return solid
+
+
+def _edge_of(surface: TriMesh, faces: int) -> float:
+    """Edge of so many even triangles on a surface."""
+    return math.sqrt(surface.area / faces * 4.0 / math.sqrt(3.0))
+
+
+def _mean_edge(surface: TriMesh) -> float:
+    edges = surface.V[surface.edges]
+    return float(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).mean())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 
 import numpy as np
@@ -21,11 +22,13 @@ from stretchmap.errors import (
     FileFormatError,
     GenusError,
     KindError,
+    MissingDependencyError,
     OptionError,
     SelfIntersectionError,
 )
 from stretchmap.preparation.handles import cut_handles
 from stretchmap.preparation.holes import close_holes, crossings, remove_crossings
+from stretchmap.preparation.rebuild import winding_mask
 from stretchmap.preparation.soup import keep_largest, part_sheets, weld
 from stretchmap.preparation.voxels import mask_surface, read_mask
 
@@ -230,6 +233,84 @@ def test_options_out_of_range(bad):
         sm.prepare(np.ones((4, 4, 4), bool), spacing=(1.0, 0.0, 1.0))
     with pytest.raises(KindError):
         sm.prepare("raw.stl")
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_ftetwild_fills_where_it_is_wanted_or_alone(installed, monkeypatch):
+    pytest.importorskip("pytetwild")
+    torus = samples.torus_surface(40, 20)
+    if installed:
+        done = sm.prepare(torus, faces=1_000, filler="ftetwild")
+    else:
+        find = importlib.util.find_spec
+        monkeypatch.setattr(
+            importlib.util, "find_spec", lambda n: None if n == "tetgen" else find(n)
+        )
+        done = sm.prepare(torus, faces=1_000)
+        with pytest.raises(MissingDependencyError, match="pytetwild"):
+            sm.prepare(torus, faces=1_000, filler="tetgen")
+    assert steps(done)["fill"] == {"tets_by_ftetwild": done.solid.n_tets}
+    done.solid.require_solid_torus()
+    assert done.solid.volume == pytest.approx(torus.volume, rel=0.04)  # 1,000 faces: 0.02
+    assert sm.volume_map(done.solid).certificate.certified
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_surface_that_crosses_itself_all_over_is_rebuilt(seed):
+    """A torus whose points are off by more than its edges: cutting out what crosses is no help."""
+    torus = samples.torus_surface(120, 60)
+    noise = np.random.default_rng(seed).normal(size=torus.V.shape)
+    rough = sm.TriMesh(torus.V + 0.1 * noise, torus.F)
+    with pytest.raises(SelfIntersectionError):
+        remove_crossings(rough)
+    done = sm.prepare(rough, faces=2_000)
+    assert steps(done)["crossings"]["faces_rebuilt"] > 0
+    done.solid.require_solid_torus()
+    assert not len(crossings(done.surface))
+    assert done.solid.volume == pytest.approx(torus.volume, rel=0.1)
+
+
+def test_the_winding_number_of_voxels():
+    upright = samples.torus_surface(60, 30)
+    V, F, n = upright.V @ _turned(), upright.F, upright.n_vertices
+    mask, corner = winding_mask(V, F, 0.1)
+    assert mask.sum() * 0.1**3 == pytest.approx(upright.volume, rel=0.01)
+    x, y, z = ((np.argwhere(mask) * 0.1 + corner) @ _turned().T).T
+    assert np.hypot(np.hypot(x, y) - 3.0, z).max() < 1.01
+    both, _ = winding_mask(np.vstack([V, V + 0.3]), np.vstack([F, F + n]), 0.1)
+    assert mask.sum() < both.sum() < 2 * mask.sum()
+    assert not winding_mask(V, np.ascontiguousarray(F[:, ::-1]), 0.1)[0].any()
+
+
+def _turned() -> np.ndarray:
+    return np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+
+
+def test_what_cannot_be_remeshed_is_filled_all_the_same(monkeypatch):
+    pytest.importorskip("pytetwild")
+    torus = samples.torus_surface(40, 20)
+    folded = torus.V.copy()
+    folded[::7] += 0.5 * np.random.default_rng(0).normal(size=folded[::7].shape)
+    crossing = sm.TriMesh(folded, torus.F)
+    assert len(crossings(crossing))
+
+    def fails(surface, faces, iterations=10):
+        return crossing
+
+    monkeypatch.setattr("stretchmap.preparation.pipeline.even", fails)
+    monkeypatch.setattr(
+        "stretchmap.preparation.pipeline.remove_crossings",
+        lambda surface: (
+            (_ for _ in ()).throw(SelfIntersectionError("no", []))
+            if surface is crossing
+            else remove_crossings(surface)
+        ),
+    )
+    done = sm.prepare(torus, faces=1_000)
+    assert steps(done)["remesh"] == {"given_up": 1}
+    done.solid.require_solid_torus()
+    with pytest.raises(SelfIntersectionError, match="ask for more"):
+        sm.prepare(torus, faces=1_000, filler="tetgen")
 
 
 def test_progress_names_every_step():

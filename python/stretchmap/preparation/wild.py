@@ -1,0 +1,111 @@
+"""Filling with tets by the optional package pytetwild (fTetWild, MPL 2.0).
+
+Hu, Schneider, Wang, Zorin, Panozzo (ACM TOG 39(4), 2020): the surface is kept within an envelope
+and need not be clean. What comes back has a boundary of its own, which does not cross itself.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import MeshError, MissingDependencyError, SolverError
+from ..mesh.meshes import TetMesh, TriMesh
+from .soup import labels
+
+__all__ = ["chosen_filler", "fill_within_envelope", "has_ftetwild"]
+
+_ENVELOPE = 5e-4  # of the diagonal of the bounding box
+# In a process of its own: what it meets on the way may abort it.
+_SCRIPT = """
+import sys, numpy, pytetwild
+data = numpy.load("surface.npz")
+V, T = pytetwild.tetrahedralize(
+    data["V"], data["F"], edge_length_abs=float(sys.argv[1]), simplify=False,
+    epsilon=float(sys.argv[2]), num_threads=1)
+numpy.savez("solid.npz", V=V, T=T)
+"""
+
+
+def has_ftetwild() -> bool:
+    """Whether pytetwild is installed."""
+    return importlib.util.find_spec("pytetwild") is not None
+
+
+def chosen_filler(wanted: str) -> str:
+    """What fills: as wanted, or the one that is installed.
+
+    Raises
+    ------
+    MissingDependencyError
+        Neither is, or not the one wanted.
+    """
+    there = {
+        "tetgen": importlib.util.find_spec("tetgen") is not None,
+        "ftetwild": has_ftetwild(),
+    }
+    if wanted == "auto" and any(there.values()):
+        return next(name for name, installed in there.items() if installed)
+    if not there.get(wanted, False):
+        raise MissingDependencyError(
+            "filling with tets needs pytetwild, pip install 'stretchmap[prepare]', or tetgen, pip "
+            "install 'stretchmap[mesh]'"
+        )
+    return wanted
+
+
+def fill_within_envelope(surface: TriMesh, edge: float) -> TetMesh:
+    """Tets with edges of about this length, the boundary within 1 / 2000 of the size.
+
+    Parameters
+    ----------
+    surface : TriMesh
+        It may cross itself; then what it winds round once or more is inside.
+    edge : float
+
+    Returns
+    -------
+    TetMesh
+        One piece, the largest.
+
+    Raises
+    ------
+    MissingDependencyError
+        If ``pytetwild`` is not installed.
+    SolverError
+        If it gives up, or nothing is inside.
+    """
+    if not has_ftetwild():
+        raise MissingDependencyError(
+            "filling a surface within an envelope needs pytetwild: "
+            "pip install 'stretchmap[prepare]'"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
+        run = subprocess.run(
+            [sys.executable, "-c", _SCRIPT, repr(edge), repr(_ENVELOPE)],
+            cwd=folder, capture_output=True, text=True, errors="replace", check=False,
+        )  # fmt: skip
+        out = Path(folder, "solid.npz")
+        if run.returncode or not out.exists():
+            said = run.stderr.strip().splitlines() or ["no reason given"]
+            raise SolverError(f"fTetWild gives up on the surface ({said[-1]})")
+        with np.load(out) as found:
+            V, T = found["V"], found["T"]
+    try:
+        return _largest(TetMesh(V, T, orient=True))
+    except MeshError as error:
+        raise SolverError(f"fTetWild found no solid inside the surface ({error})") from error
+
+
+def _largest(solid: TetMesh) -> TetMesh:
+    """The component with the largest volume, without unused vertices."""
+    label = labels(solid.n_vertices, np.repeat(solid.T[:, 0], 3), solid.T[:, 1:].ravel())
+    of_tets = label[solid.T[:, 0]]
+    volumes = np.bincount(of_tets, solid.tet_volumes)
+    return TetMesh(solid.V, solid.T[of_tets == int(volumes.argmax())]).compact()[0]
