@@ -1,4 +1,4 @@
-"""Reader of Gmsh's ``.msh`` files of version 4.1, text and binary.
+"""Reader of Gmsh's ``.msh`` files of versions 2 and 4.1, text and binary.
 
 meshio's makes room for whatever a header announces, takes tables as long as the largest tag, and
 fails where some entities belong to physical groups and others do not.
@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from ..errors import FileFormatError
 from .arrays import MeshArrays
 from .cells import Block, simplices
+from .gmsh_sources import Binary, Source, Text
 
-__all__ = ["is_gmsh_41", "read_gmsh_41"]
+__all__ = ["is_gmsh", "read_gmsh"]
 
-_FORMAT = re.compile(rb"\s*\$MeshFormat\s+4\.1\s+([01])\s+8\s*\n")
+_FORMAT = re.compile(rb"\s*\$MeshFormat\s+(4\.1|2(?:\.\d)?)\s+([01])\s+8\s*\n")
 _SECTION = re.compile(rb"^\$(\w+)[ \t]*\r?\n", re.MULTILINE)
 # Number of an element type: its name and its nodes.
 _TYPES = {
@@ -31,12 +32,12 @@ _TYPES = {
 }  # fmt: skip
 
 
-def is_gmsh_41(data: bytes) -> bool:
+def is_gmsh(data: bytes) -> bool:
     """Whether it is such a file; the others are meshio's."""
     return _FORMAT.match(data) is not None
 
 
-def read_gmsh_41(data: bytes) -> MeshArrays:
+def read_gmsh(data: bytes) -> MeshArrays:
     """Parse a file: points, triangles or tets, their groups, and data by node and by element.
 
     Cell data ``gmsh:physical`` is the first physical group of each element's entity, 0 where it has
@@ -51,18 +52,23 @@ def read_gmsh_41(data: bytes) -> MeshArrays:
     """
     header = _FORMAT.match(data)
     if header is None:
-        raise FileFormatError("it is no .msh file of version 4.1")
-    take: type[_Text] | type[_Binary] = _Binary if header[1] == b"1" else _Text
-    if take is _Binary and data[header.end() : header.end() + 4] != b"\1\0\0\0":
+        raise FileFormatError("it is no .msh file of version 2 or 4.1")
+    take: type[Text] | type[Binary] = Binary if header[2] == b"1" else Text
+    if take is Binary and data[header.end() : header.end() + 4] != b"\1\0\0\0":
         raise FileFormatError("its bytes are in the order of another kind of machine")
+    readers = _READERS if header[1] == b"4.1" else _READERS_OF_2
     found = _Found()
     at = _after(data, b"$EndMeshFormat", header.end())
     while section := _SECTION.search(data, at):
         name = section[1].decode()
         mark, at = b"$End" + section[1], section.end()
-        if name in _READERS:
+        if name in readers:
+            count = 0
+            if readers is _READERS_OF_2:  # text in every file
+                end = data.find(b"\n", at) + 1
+                count, at = int(data[at:end]), end
             source = take(data, at, mark)
-            _READERS[name](found, source)
+            readers[name](found, source, count)
             at = source.end
         elif name in ("NodeData", "ElementData"):
             label, width, rows, at = _data_header(data, at)
@@ -98,46 +104,6 @@ def _data_header(data: bytes, at: int) -> tuple[str, int, int, int]:
     return names[0], int(width), int(rows), at
 
 
-class _Text:
-    """Numbers of a section one after the other."""
-
-    def __init__(self, data: bytes, at: int, mark: bytes) -> None:
-        self.end = max(data.find(mark, at), at)
-        self._words, self._at = data[at : self.end].split(), 0
-
-    def take(self, kind: str, count: int) -> NDArray[Any]:
-        words = self._words[self._at : self._at + count]
-        if count < 0 or len(words) != count:
-            raise FileFormatError("the file ends within a section")
-        self._at += count
-        return np.array(words, np.bytes_).astype(kind) if count else np.empty(0, kind)
-
-    def rows(self, count: int, width: int) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Rows of a tag and numbers."""
-        table = self.take("<f8", count * (1 + width)).reshape(count, 1 + width)
-        return table[:, 0].astype(np.int64), table[:, 1:]
-
-
-class _Binary:
-    """Numbers of a section one after the other."""
-
-    def __init__(self, data: bytes, at: int, mark: bytes) -> None:
-        self._data, self.end = data, at
-
-    def take(self, kind: Any, count: int) -> NDArray[Any]:
-        size = np.dtype(kind).itemsize * count
-        if size < 0 or self.end + size > len(self._data):
-            raise FileFormatError("the file ends within a section")
-        self.end += size
-        return np.frombuffer(self._data, kind, count, self.end - size)
-
-    def rows(self, count: int, width: int) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Rows of a tag and numbers."""
-        table = self.take(np.dtype([("tag", "<i4"), ("values", "<f8", (width,))]), count)
-        return table["tag"].astype(np.int64), table["values"]
-
-
-_Source = _Text | _Binary
 _Rows = tuple[NDArray[Any], NDArray[Any]]
 
 
@@ -182,7 +148,7 @@ def _by_tag(tags: NDArray[Any], rows: _Rows) -> NDArray[np.float64]:
     return out[:, 0] if out.shape[1] == 1 else out
 
 
-def _entities(found: _Found, source: _Source) -> None:
+def _entities(found: _Found, source: Source, _: int) -> None:
     for dim, count in enumerate(source.take("<i8", 4).tolist()):
         for _ in range(count):
             tag = int(source.take("<i4", 1)[0])
@@ -193,7 +159,7 @@ def _entities(found: _Found, source: _Source) -> None:
             found.physical[dim, tag] = int(groups[0]) if len(groups) else 0
 
 
-def _nodes(found: _Found, source: _Source) -> None:
+def _nodes(found: _Found, source: Source, _: int) -> None:
     if found.tags is not None:
         raise FileFormatError("it holds two lists of nodes")
     n_blocks, announced, _, _ = source.take("<i8", 4).tolist()
@@ -209,7 +175,7 @@ def _nodes(found: _Found, source: _Source) -> None:
         raise FileFormatError(f"{announced} nodes are announced, {len(found.tags)} follow")
 
 
-def _elements(found: _Found, source: _Source) -> None:
+def _elements(found: _Found, source: Source, _: int) -> None:
     n_blocks, announced, _, _ = source.take("<i8", 4).tolist()
     total = 0
     for _ in range(n_blocks):
@@ -230,4 +196,31 @@ def _elements(found: _Found, source: _Source) -> None:
         raise FileFormatError(f"{announced} elements are announced, {total} follow")
 
 
+def _nodes_of_2(found: _Found, source: Source, count: int) -> None:
+    if found.tags is not None:
+        raise FileFormatError("it holds two lists of nodes")
+    found.tags, found.points = source.rows(count, 3)
+
+
+def _elements_of_2(found: _Found, source: Source, count: int) -> None:
+    """Runs of elements of one type with one number of tags."""
+    while count:
+        kind, n_tags, most = source.run(count)
+        if kind not in _TYPES or n_tags < 0:
+            raise FileFormatError(f"elements of type {kind} with {n_tags} tags are not known")
+        name, width = _TYPES[kind]
+        rows = source.run_rows(kind, n_tags, most, width)
+        if not len(rows):
+            raise FileFormatError("the file ends within its elements")
+        tags, nothing = rows[:, 1 : 1 + n_tags], np.zeros(len(rows), int)
+        data = {
+            "gmsh:physical": tags[:, 0] if n_tags > 0 else nothing,
+            "gmsh:geometrical": tags[:, 1] if n_tags > 1 else nothing,
+        }
+        found.blocks.append(Block(name, rows[:, 1 + n_tags :], data))
+        found.element_tags.append(rows[:, 0])
+        count -= len(rows)
+
+
 _READERS = {"Entities": _entities, "Nodes": _nodes, "Elements": _elements}
+_READERS_OF_2 = {"Nodes": _nodes_of_2, "Elements": _elements_of_2}

@@ -36,7 +36,7 @@ from ..mesh.given import as_mesh, as_solid, as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from .arrays import MeshArrays, checked, checked_uv
 from .foreign import is_for_vtk_alone, read_pyvista, read_trimesh
-from .gmsh import is_gmsh_41, read_gmsh_41
+from .gmsh import is_gmsh, read_gmsh
 from .meshio import read_meshio, write_meshio
 from .npz import read_npz, write_npz
 from .obj import read_obj, write_obj
@@ -247,9 +247,9 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
                 return _READERS[suffix](file.read())
             if suffix == ".npz":
                 return read_npz(file)
-            if suffix == ".msh" and is_gmsh_41(file.read(200)):
+            if suffix == ".msh" and is_gmsh(file.read(200)):
                 file.seek(0)
-                return read_gmsh_41(file.read())
+                return read_gmsh(file.read())
     with parsing(path):
         if suffix in _TRIMESH:
             return read_trimesh(path)

@@ -101,17 +101,56 @@ def test_gmsh_files_that_are_wrong(change, message, tmp_path):
         read(path)
 
 
+GMSH_2 = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+5
+1 0 0 0
+7 1 0 0
+3 0 1 0
+4 0 0 1
+99 1 1 1
+$EndNodes
+$Elements
+4
+1 15 2 0 9 1
+2 2 2 8 2 1 7 3
+3 4 2 7 1 1 7 3 4
+4 4 3 5 1 0 7 3 4 99
+$EndElements
+"""
+
+
+def test_gmsh_of_version_2(tmp_path):
+    path = tmp_path / "part.msh"
+    path.write_text(GMSH_2)
+    found = read_arrays(path)
+    np.testing.assert_array_equal(found.V[4], [1, 1, 1])
+    np.testing.assert_array_equal(found.T, [[0, 1, 2, 3], [1, 2, 3, 4]])
+    np.testing.assert_array_equal(found.cell_data["gmsh:physical"], [7, 5])
+    path.write_text(GMSH_2.replace("99 1 1 1", "999999999 1 1 1"))
+    with pytest.raises(FileFormatError, match="not there"):
+        read(path)
+    path.write_text(GMSH_2.replace("$Elements\n4", "$Elements\n5"))
+    with pytest.raises(FileFormatError, match="part"):
+        read(path)
+
+
+@pytest.mark.parametrize("version", ["gmsh22", "gmsh"])
 @pytest.mark.parametrize("binary", [False, True])
-def test_gmsh_as_meshio_writes_it(binary, tmp_path):
+def test_gmsh_as_meshio_writes_it(binary, version, tmp_path):
     meshio = pytest.importorskip("meshio")
     solid = sm.samples.solid_torus(600)
     data = {"gmsh:physical": [np.arange(solid.n_tets)], "gmsh:geometrical": [np.ones(solid.n_tets)]}
     data = {name: [a.astype(np.int32) for a in parts] for name, parts in data.items()}
     mesh = meshio.Mesh(solid.V, [("tetra", solid.T)], cell_data=data)
-    mesh.write(tmp_path / "t.msh", file_format="gmsh", binary=binary)
+    mesh.write(tmp_path / "t.msh", file_format=version, binary=binary)
     found = read_arrays(tmp_path / "t.msh")
     np.testing.assert_array_equal(found.V, solid.V)
     np.testing.assert_array_equal(found.T, solid.T)
+    if version == "gmsh22":  # of version 4.1 entities have groups, which meshio does not write
+        np.testing.assert_array_equal(found.cell_data["gmsh:physical"], np.arange(solid.n_tets))
 
 
 def quadratic(solid: sm.TetMesh) -> tuple[np.ndarray, np.ndarray]:
