@@ -20,7 +20,7 @@ __all__ = ["Budget", "History", "SolidModel", "face_areas"]
 
 FREE, FIXED, GLIDING = 0, 1, 2
 _LEAST_SECONDS, _MARGIN = 4.0, 0.9  # a stage under way is ended
-_THICK = 0.01  # of a tet that is none too flat: volume over its mean edge cubed; regular: 0.118
+_THICK = 0.1  # share of the mean volume round its vertices that a sliver is given
 _REACH = 8.0  # factor up to which the volume next to a boundary face may be off what it expects
 
 
@@ -94,18 +94,15 @@ class SolidModel:
 
     @cached_property
     def roomy_volumes(self) -> NDArray[np.float64]:
-        """`local_volumes`, but of a sliver what its edges would leave room for: (k,).
+        """`local_volumes`, but of a sliver what there is room for among its neighbors: (k,).
 
         A sliver is turned by making it thicker. In units of its own volume, which may be a
         billionth of that, its determinant means nothing and its energy drowns that of all others.
         """
-        corners = self.V[self.T]
-        squares = [
-            ((corners[:, a] - corners[:, b]) ** 2).sum(axis=1)
-            for a, b in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-        ]
-        room = _THICK * np.mean(squares, axis=0) ** 1.5
         volumes = _core.volume.signed_tet_volumes(self.V, self.T)
+        counts = np.bincount(self.T.ravel(), minlength=len(self.V))
+        means = _core.measures.ring_sums(self.T, volumes, len(self.V)) / np.maximum(counts, 1)
+        room = _THICK * means[self.T].min(axis=1)
         roomy: NDArray[np.float64] = self.local_volumes * np.maximum(room / volumes, 1.0)
         return roomy
 
