@@ -22,7 +22,7 @@ from collections.abc import Sequence
 
 __all__ = ["GROUPS", "main"]
 
-GROUPS = ("meshes", "maps", "volumes", "pictures", "applications", "doctor")
+GROUPS = ("meshes", "maps", "volumes", "pictures", "applications", "populations", "doctor")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

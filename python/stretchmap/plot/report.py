@@ -6,7 +6,7 @@ import base64
 import html
 import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..base.files import atomic_path
@@ -118,18 +118,23 @@ def _page(result: MapResult, source: str) -> str:
     )
     title = f"{figures['kind']} map {source}".replace("map map", "map").strip()
     parts = [
-        f"<h1>{html.escape(title)}</h1>",
         f'<p class="verdict {style}"><b>{verdict}</b>{html.escape(certificate.reason)}.</p>',
         *_pictures(result),
         "<h2>Figures</h2>",
-        _table(rows),
+        figure_table(rows),
         "<h2>Certificate</h2>",
-        _table({**certificate.checks, **certificate.quantities}),
+        figure_table({**certificate.checks, **certificate.quantities}),
         "<h2>Seconds</h2>",
-        _table(figures["seconds"]),
+        figure_table(figures["seconds"]),
         "<h2>Versions</h2>",
-        _table(figures["versions"]),
+        figure_table(figures["versions"]),
     ]
+    return page(title, parts)
+
+
+def page(title: str, parts: Sequence[str]) -> str:
+    """A whole page from its parts."""
+    parts = [f"<h1>{html.escape(title)}</h1>", *parts]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f"<title>{html.escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
@@ -153,7 +158,7 @@ def _pictures(result: MapResult) -> list[str]:
             missing.append(f"<li>{html.escape(caption)} {html.escape(str(error))}</li>")
             continue
         parts.append(
-            f'<figure><img alt="{html.escape(caption)}" src="{_embedded(figure)}">'
+            f'<figure><img alt="{html.escape(caption)}" src="{embedded(figure)}">'
             f"<figcaption>{html.escape(caption)}</figcaption></figure>"
         )
     if missing:
@@ -161,13 +166,13 @@ def _pictures(result: MapResult) -> list[str]:
     return parts
 
 
-def _embedded(figure: Figure) -> str:
+def embedded(figure: Figure) -> str:
     buffer = io.BytesIO()
     figure.savefig(buffer, dpi=110, format="png")
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
-def _table(rows: Mapping[str, Any]) -> str:
+def figure_table(rows: Mapping[str, Any]) -> str:
     lines = (
         f"<tr><td>{html.escape(str(name).replace('_', ' '))}</td>"
         f"<td>{html.escape(cell(value))}</td><td>{html.escape(_MEANING.get(name, ''))}</td></tr>"

@@ -49,6 +49,9 @@ class Correspondence(MapResult):
         What decided along the surface, ``"smooth"`` or ``"area"``. ``"area"`` although ``"smooth"``
         was asked for means that the smooth one could not be certified; ``note`` says why.
     note : str
+    smooth : ndarray, shape (n0, 3)
+        Where the smooth deformation takes the template's own vertices, near the solid; their images
+        themselves for ``"area"``.
     distance : float
         Root mean square distance of the smooth deformation from the surface before its points were
         put onto it, over the size; NaN for ``"area"``.
@@ -70,6 +73,7 @@ class Correspondence(MapResult):
     certificate: Certificate
     along: str
     note: str
+    smooth: Array = field(repr=False)
     distance: float
 
     def extra_scalars(self) -> dict[str, Any]:
@@ -140,11 +144,12 @@ def correspond(
     clock = time.perf_counter()
     given = template if isinstance(template, Template) else Template(template)
     found: Registration | FillMap | None = None
-    note, distance = "", float("nan")
+    note, distance, moved = "", float("nan"), None
     if along == "smooth":
-        found, distance, note = _smooth(given, solid, start, landmarks, volume_weight)
+        found, moved, distance, note = _smooth(given, solid, start, landmarks, volume_weight)
     if found is None:
         found = _registered(given, solid, landmarks)
+        moved = found.image[: given.solid.n_vertices]
     return Correspondence(
         mesh=found.mesh,
         target=solid,
@@ -152,6 +157,7 @@ def correspond(
         certificate=found.certificate,
         along="area" if note or along == "area" else "smooth",
         note=note,
+        smooth=np.asarray(moved),
         distance=distance,
         history=found.history,
         converged=found.converged,
@@ -173,8 +179,8 @@ def _smooth(
     start: Array | None,
     landmarks: Array | None,
     volume_weight: float,
-) -> tuple[FillMap | None, float, str]:
-    """The smooth map, the distance of the deformation from the surface; or why there is none."""
+) -> tuple[FillMap | None, Array, float, str]:
+    """The smooth map, or why there is none; the deformation, its distance from the surface."""
     surface = template.solid.surface
     if start is not None:
         poses = [similarity_onto(surface.V, start)]
@@ -190,12 +196,12 @@ def _smooth(
     pose, fitted = poses[best], fits[best]
     distance = fitted.distance / template.spline.length
     goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)
-    points = pose(_settled(template, goal, fitted.projected))
+    points, moved = pose(_settled(template, goal, fitted.projected)), pose(fitted.points)
     options = FillOptions(volume_weight=volume_weight)
     try:
-        return fill(template.solid, points, options=options), distance, ""
+        return fill(template.solid, points, options=options), moved, distance, ""
     except (MeshError, SolverError) as error:
-        return None, distance, f"smooth correspondence given up: {error}"
+        return None, moved, distance, f"smooth correspondence given up: {error}"
 
 
 def _fitted(

@@ -20,13 +20,11 @@ from .thin_plate import ThinPlate, solve_dense
 
 __all__ = ["Anchors", "Fit", "Template", "fit_surface"]
 
-_SITES = 120  # of the spline
+_SITES, _FEW_SITES = 100, 40  # of the spline, and of one for a first look
 # Weights of the bending energy, one after the other, against the mean square distance.
 _STIFFNESS = (1e-3, 1e-4, 1e-5)
-_STEPS, _AT_REST = (
-    12,
-    1e-4,
-)  # most steps with each; a step that moves by less, over the size, ends it
+_STEPS = 12  # most with each
+_AT_REST = 2e-4  # a step that moves by less, over the size, is the last
 _SAME_WAY = 0.5  # least cosine between normals of points drawn to each other
 
 Array = NDArray[np.float64]
@@ -83,6 +81,13 @@ class Template:
         return self.spline.features(self.solid.surface.V)
 
     @cached_property
+    def coarse(self) -> Template:
+        """The same with a spline of few sites."""
+        found = Template(self.solid, self.anchors)
+        found.__dict__["spline"] = ThinPlate.of(self.solid.surface.V, _FEW_SITES)
+        return found
+
+    @cached_property
     def ring_mean(self) -> sp.csr_matrix:
         """(nb, nb) Takes values at the surface's vertices to the means of their neighbors."""
         edges, n = self.solid.surface.edges, self.solid.surface.n_vertices
@@ -98,8 +103,8 @@ class Fit:
 
     Attributes
     ----------
-    points : ndarray, shape (nb, 3)
-        Where the spline takes the template's boundary vertices.
+    points : ndarray, shape (n, 3)
+        Where the spline takes the template's vertices.
     projected : ndarray, shape (nb, 3)
         The closest points of the goal.
     distance : float
@@ -136,7 +141,7 @@ def fit_surface(
     landmarks : ndarray, shape (l, 3), or None
         Where the template's landmarks belong.
     coarse : bool
-        Stop at the stiffest.
+        A first look: few sites, and only the stiffest spline.
 
     Returns
     -------
@@ -148,6 +153,7 @@ def fit_surface(
     in steps (Chen and Medioni 1992; Amberg, Romdhani, Vetter, CVPR 2007). Pairs whose normals are
     more than 60 degrees apart are left out.
     """
+    template = template.coarse if coarse else template
     surface, spline = template.solid.surface, template.spline
     rest, F = surface.V, surface.F
     side = _Side(goal.V, goal.F)
@@ -166,9 +172,11 @@ def fit_surface(
             coefficients = found
             if step < _AT_REST * spline.length:
                 break
-    points = np.ascontiguousarray(rest + template.features @ coefficients)
-    projected = side.tree.closest(points)[0]
-    square = float(((projected - points) ** 2).sum(axis=1).mean())
+    solid = template.solid
+    points = solid.V + spline.features(solid.V) @ coefficients
+    skin = np.ascontiguousarray(points[solid.boundary_vertices])
+    projected = side.tree.closest(skin)[0]
+    square = float(((projected - skin) ** 2).sum(axis=1).mean())
     bending = float(np.einsum("rk,rs,sk->", coefficients, spline.bending, coefficients))
     energy = square + _STIFFNESS[0] * bending
     return Fit(points, projected, math.sqrt(square), step, energy)

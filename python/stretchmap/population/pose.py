@@ -12,8 +12,8 @@ from .procrustes import Similarity
 
 __all__ = ["rigid_poses"]
 
-_FEW, _MANY = 100, 400  # faces of either surface that are compared, at first and then
-_FIRST, _KEPT, _LAST = 6, 10, 60  # steps of every start, starts that go on, and steps of those
+_FEW, _MANY = 80, 250  # faces of either surface that are compared, at first and then
+_FIRST, _KEPT, _LAST = 5, 8, 30  # steps of every start, starts that go on, and steps of those
 _NEARLY, _MOST = 2.0, 6  # distance over the least of what is kept, and how many that are
 _SAME = 1.0 + 2.0 * np.cos(np.radians(20.0))  # trace of the rotation between two that are one
 _AT_REST = 1e-6

@@ -55,7 +55,7 @@ def test_affine_maps_are_recovered_exactly(bones):
     matrix = np.eye(3) + 0.05 * np.random.default_rng(3).standard_normal((3, 3))
     goal = sm.TriMesh(template.solid.surface.V @ matrix + [0.1, 0.0, 0.2], template.solid.surface.F)
     fitted = fit_surface(template, goal, template.solid.surface.V, None)
-    assert np.abs(fitted.points - goal.V).max() < 1e-3 * size(goal.V)
+    assert np.abs(fitted.projected - goal.V).max() < 1e-3 * size(goal.V)
     assert fitted.distance < 1e-4 * size(goal.V)
 
 
@@ -78,7 +78,7 @@ def test_landmarks_draw(bones):
         fit_surface(template, solid.surface, solid.surface.V, marks) for marks in (None, moved)
     )
     gaps = [
-        np.linalg.norm(template.anchors.at(f.points, solid.surface.F) - moved, axis=1)
+        np.linalg.norm(template.anchors.at(f.projected, solid.surface.F) - moved, axis=1)
         for f in (free, held)
     ]
     assert gaps[1][0] < 0.3 * gaps[0][0]

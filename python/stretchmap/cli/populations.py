@@ -1,0 +1,119 @@
+"""The command for many solids: population."""
+
+from __future__ import annotations
+
+import logging
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from . import common
+from .common import Json, Quiet
+
+if TYPE_CHECKING:
+    from ..population.result import Population
+
+_log = logging.getLogger("stretchmap")
+
+
+class Along(str, Enum):
+    """Values of ``--along``."""
+
+    smooth = "smooth"
+    area = "area"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command of this module."""
+    app.command()(population)
+
+
+def population(
+    solids: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Meshes of tets.", show_default=False)
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", help="Run folder; begun runs go on.", show_default=False),
+    ],
+    template: Annotated[
+        str | None,
+        typer.Option(help="Name of a shape, or a mesh, to start from.", show_default=False),
+    ] = None,
+    landmarks: Annotated[
+        Path | None,
+        typer.Option(help="Folder of NAME.csv: x, y, z per row.", show_default=False),
+    ] = None,
+    executor: Annotated[
+        str, typer.Option(help="serial, processes, processes:N or dask://host:port.")
+    ] = "serial",
+    along: Annotated[
+        Along, typer.Option(help="What decides where points go along the surface.")
+    ] = Along.smooth,
+    scale: Annotated[bool, typer.Option(help="Take out size.")] = True,
+    max_rounds: Annotated[int, typer.Option(help="Most rounds of the template.")] = 6,
+    tol: Annotated[float, typer.Option(help="Movement of the template at rest, over its size.")] = (
+        1e-3
+    ),
+    json: Json = None,
+    quiet: Quiet = False,
+) -> int:
+    """Mean and modes of a folder of solids.
+
+    Writes a map and a record of every shape, population.npz, mean.npz and report.html into the
+    run folder. Exit code 1 if shapes were skipped or the template is not at rest.
+    """
+    from ..base.progress import terminal
+    from ..io.read_write import write
+    from ..plot.population_report import write_population_report
+    from ..population.run import fit
+
+    common.require_package("matplotlib", "the report", "plot")
+    if json is not None:
+        common.check_output(json, (json.suffix.lower(),))
+    with terminal(quiet) as bar:
+        found = fit(
+            solids,
+            template,
+            landmarks,
+            folder=output,
+            executor=executor,
+            along=along.value,
+            scale=scale,
+            max_rounds=max_rounds,
+            tol=tol,
+            progress=bar,
+        )
+    found.save(output / "population.npz")
+    write(output / "mean.npz", found.mean)
+    write_population_report(found, output / "report.html", str(solids.name))
+    common.write_json(json, found.to_dict())
+    if not quiet:
+        typer.echo(found.summary())
+        _list_shapes(found)
+        typer.echo(f"written to {output}")
+    for name in found.skipped:
+        _log.error("%s was skipped", name)
+    return 1 if found.skipped or not found.converged else 0
+
+
+def _list_shapes(found: Population) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None)
+    for column in ("shape", "tets", "certified", "along", "distance / size", "seconds"):
+        table.add_column(column)
+    for record in found.records:
+        if not record["ok"]:
+            table.add_row(record["name"], "skipped", record["error"])
+            continue
+        distance = "-" if record["distance"] is None else f"{record['distance']:.5f}"
+        certified = "yes" if record["certified"] else "no"
+        table.add_row(
+            record["name"], str(record["n_tets"]), certified, record["along"], distance,
+            f"{record['seconds']:.1f}",
+        )  # fmt: skip
+    Console().print(table)

@@ -1,0 +1,308 @@
+"""A population from its shapes: template, correspondences, mean, modes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import read_only
+from ..base.files import atomic_path
+from ..base.options import as_path, callback, flag, one_of, real, whole
+from ..base.progress import Progress, report
+from ..certificate.checks import certify
+from ..certificate.findings import Certificate
+from ..errors import OptionError, SolverError, StretchmapError
+from ..io.npz import save_npz
+from ..mesh.given import as_solid
+from ..mesh.meshes import TetMesh
+from ..volume.fill import fill
+from ..volume.options import FillOptions
+from .correspondence import Along
+from .executors import Executor, as_executor
+from .fitting import Anchors
+from .procrustes import generalized_procrustes, similarity_onto
+from .result import Population
+from .shape_model import shape_model
+from .shapes import Shape, gather_landmarks, gather_shapes
+from .task import Job, Record, failed, run_job
+
+__all__ = ["fit"]
+
+_log = logging.getLogger("stretchmap")
+
+_COLD_ROUNDS = 2  # in which every shape is laid on the template anew; then from where it was
+_TEMPLATE = "template"  # name of its landmarks, if it is none of the shapes
+
+Array = NDArray[np.float64]
+Solids = str | Path | Sequence[Any] | Mapping[str, Any]
+
+
+def fit(
+    solids: Solids,
+    template: TetMesh | str | Path | None = None,
+    landmarks: Any = None,
+    *,
+    folder: str | Path | None = None,
+    executor: str | Executor | None = None,
+    along: Along = "smooth",
+    scale: bool = True,
+    volume_weight: float = 1.0,
+    max_rounds: int = 6,
+    tol: float = 1e-3,
+    progress: Progress | None = None,
+) -> Population:
+    """Bring shapes into correspondence, find their mean and the modes by which they differ.
+
+    A template is mapped onto every shape, the images are brought into one pose and averaged, and
+    the average is the next template, until it stays where it is.
+
+    Parameters
+    ----------
+    solids : folder, or sequence or mapping of TetMesh and paths
+        Solid tori. Files are read one at a time, when their turn comes.
+    template : TetMesh, name of a shape, or path, optional
+        Where to start; the first shape that can be read by default. Its mesh is that of the result.
+    landmarks : folder of NAME.csv, mapping by name, or array_like (k, l, 3), optional
+        Points on the surfaces that correspond. A template that is none of the shapes has its own
+        under the name ``"template"``.
+    folder : path, optional
+        The run folder: a JSON record of every shape and round, a map of every shape. A run that was
+        stopped goes on where it was, with the same result bit for bit. Without it the maps are
+        kept in a temporary folder and thrown away.
+    executor : {"serial", "processes", "processes:N", "dask://host:port"}, client or object
+        Where shapes are mapped. The result does not depend on it, to the last bit.
+    along : {"smooth", "area"}
+        What decides where points go along the surface, see `correspond`.
+    scale : bool
+        Take out size as well as pose.
+    volume_weight : float
+        See `correspond`.
+    max_rounds : int
+        Most rounds.
+    tol : float
+        The template is at rest when averaging moves its surface along the normals by no more than
+        this share of its size, root mean square.
+    progress : Progress, optional
+        Called once per shape and round.
+
+    Returns
+    -------
+    Population
+
+    Raises
+    ------
+    OptionError
+        An option out of range, names that are not unique, or a folder that holds another run.
+    SolverError
+        Fewer than two shapes could be mapped; the message has the first reason.
+    CertificationError
+        The mean cannot be made free of flipped tets.
+
+    Notes
+    -----
+    A shape that cannot be read or mapped is skipped: it is in ``skipped`` with the reason.
+    Groupwise mean after Joshi, Davis, Jomier, Gerig, NeuroImage 23, 2004, with correspondences in
+    place of diffeomorphisms.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> bones = sm.samples.vertebra_population(6, seed=2, n_tets=600)
+    >>> found = sm.population.fit(bones.solids[:3], max_rounds=1)
+    >>> found.correspondences.shape == (3, bones.solids[0].n_vertices, 3)
+    True
+    """
+    one_of("along", along, ("smooth", "area"))
+    scale, tol = flag("scale", scale), real("tol", tol, 0.0)
+    volume_weight = real("volume_weight", volume_weight, above=0.0)
+    max_rounds = whole("max_rounds", max_rounds, 1, 1000)
+    callback("progress", progress)
+    workers = as_executor(executor)
+    shapes = gather_landmarks(gather_shapes(solids), landmarks)
+    solid, marks = _start(shapes, template, landmarks)
+    with ExitStack() as stack:
+        place = as_path(folder or stack.enter_context(tempfile.TemporaryDirectory()))
+        _prepare(place, {"along": along, "scale": scale, "volume_weight": volume_weight})
+        anchors = None if marks is None else Anchors.of(solid.surface, marks)
+        run = _Run(place, shapes, workers, along, scale, volume_weight, progress)
+        found = run.until_at_rest(solid, anchors, max_rounds, tol)
+    return replace(found, folder=None) if folder is None else found
+
+
+def _start(shapes: list[Shape], template: Any, landmarks: Any) -> tuple[TetMesh, Array | None]:
+    """The first template and its landmarks."""
+    if template is None:
+        reasons = []
+        for shape in shapes:
+            try:
+                return shape.load(), shape.load_landmarks()
+            except (StretchmapError, OSError) as error:
+                reasons.append(f"{shape.name}: {error}")
+        raise SolverError(f"no shape can be read; {reasons[0]}")
+    for shape in shapes:
+        if isinstance(template, str) and shape.name == template:
+            return shape.load(), shape.load_landmarks()
+    if isinstance(template, (str, os.PathLike)):
+        own = Shape(_TEMPLATE, as_path(template))
+    else:
+        own = Shape(_TEMPLATE, as_solid(template, "template"))
+    if landmarks is not None:
+        if not isinstance(landmarks, (str, os.PathLike, Mapping)):
+            raise OptionError(
+                "a template that is none of the shapes needs landmarks of its own: pass a mapping "
+                f"or a folder with those of {_TEMPLATE!r}"
+            )
+        (own,) = gather_landmarks([own], landmarks)
+    return own.load(), own.load_landmarks()
+
+
+def _prepare(folder: Path, settings: dict[str, Any]) -> None:
+    """Make the run folder, or check that it is of such a run.
+
+    Raises
+    ------
+    OptionError
+        It is that of a run with other settings.
+    """
+    for name in ("maps", "images", "records"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    path = folder / "run.json"
+    if path.exists():
+        try:
+            before = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError:
+            before = None
+        if before != settings:
+            raise OptionError(f"{folder} holds a run with other settings, {before}; take another")
+        return
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(settings, indent=1), encoding="utf-8")
+
+
+@dataclass
+class _Run:
+    """What stays the same from round to round."""
+
+    folder: Path
+    shapes: list[Shape]
+    executor: Executor
+    along: Along
+    scale: bool
+    volume_weight: float
+    progress: Progress | None
+
+    def until_at_rest(
+        self, solid: TetMesh, anchors: Anchors | None, max_rounds: int, tol: float
+    ) -> Population:
+        """Rounds until the template stays where it is."""
+        moved: list[float] = []
+        for number in range(max_rounds):
+            records, images, smooth = self._round(number, solid, anchors)
+            poses = generalized_procrustes(images, scale=self.scale, start=solid.V)
+            # Smooth deformations are averaged: points that were put onto surfaces crowd at their
+            # edges, more so with every round.
+            average = np.mean([m(x) for m, x in zip(poses.moves, smooth, strict=True)], axis=0)
+            moved.append(_movement(solid, average))
+            _log.info("round %d: the template moved by %.3g of its size", number, moved[-1])
+            if moved[-1] <= tol or number == max_rounds - 1:
+                break
+            solid = _certified(solid, average, self.volume_weight)[0]
+        mean, certificate = _certified(solid, poses.mean, self.volume_weight)
+        at_rest = moved[-1] <= tol
+        if not at_rest:
+            _log.warning("the template is not at rest after %d rounds (tol=%g)", len(moved), tol)
+        return Population(
+            names=tuple(r["name"] for r in records if r["ok"]),
+            mean=mean,
+            certificate=certificate,
+            correspondences=read_only(images),
+            aligned=poses.aligned,
+            model=shape_model(poses.aligned, poses.mean),
+            records=tuple(records),
+            moved=tuple(moved),
+            converged=at_rest,
+            stop_reason="template at rest" if at_rest else "most rounds done",
+            folder=self.folder,
+            shapes=tuple(self.shapes),
+        )
+
+    def _round(
+        self, number: int, solid: TetMesh, anchors: Anchors | None
+    ) -> tuple[list[Record], Array, Array]:
+        """The template mapped onto every shape; records of all, and of those done the images and
+        the smooth deformations, (k, n, 3)."""
+        digest = _write_template(self.folder / f"template-{number}.npz", solid, anchors)
+        jobs = [
+            Job(shape, self.folder, number, digest, number >= _COLD_ROUNDS, self.along,
+                self.volume_weight)
+            for shape in self.shapes
+        ]  # fmt: skip
+        records: dict[int, Record] = {}
+        for i, outcome in self.executor.run(run_job, jobs):
+            lost = isinstance(outcome, Exception)
+            records[i] = failed(jobs[i], str(outcome)) if lost else outcome
+            if not records[i]["ok"]:
+                _log.warning("%s is skipped: %s", jobs[i].shape.name, records[i]["error"])
+            report(self.progress, f"round {number + 1}", len(records), len(jobs))
+        done = [i for i in range(len(jobs)) if records[i]["ok"]]
+        if len(done) < 2:
+            reason = next((r["error"] for r in records.values() if not r["ok"]), "only one given")
+            raise SolverError(f"{len(done)} shapes could be mapped, two are needed; {reason}")
+        images, smooth = np.stack([np.load(jobs[i].image_file) for i in done], axis=1)
+        return [records[i] for i in range(len(jobs))], images, smooth
+
+
+def _certified(solid: TetMesh, points: Array, weight: float) -> tuple[TetMesh, Certificate]:
+    """The template moved to the mean; inside as `fill` has it, where averaging turned a tet over.
+
+    Raises
+    ------
+    CertificationError, SelfIntersectionError
+        That does not help.
+    """
+    certificate = certify(solid, points)
+    if not certificate.certified:
+        options = FillOptions(volume_weight=weight, refine=False)
+        found = fill(solid, points[solid.boundary_vertices], options=options)
+        points, certificate = found.image, found.certificate
+    return TetMesh(points, solid.T), certificate
+
+
+def _movement(solid: TetMesh, after: Array) -> float:
+    """Root mean square way of the surface along its normals, in the same pose, over the size.
+
+    Along the surface the vertices of a template may go on moving, slowly and all shapes alike:
+    that changes neither its shape nor what corresponds.
+    """
+    skin, surface = solid.boundary_vertices, solid.surface
+    ways = similarity_onto(solid.V, after)(solid.V)[skin] - after[skin]
+    corners = after[skin][surface.F]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(areas, axis=1)
+    along = np.einsum("mx,mx->m", ways[surface.F].mean(axis=1), areas) / lengths
+    size = float(np.linalg.norm(np.ptp(after, axis=0)))
+    return float(np.sqrt((lengths * along**2).sum() / lengths.sum())) / size
+
+
+def _write_template(path: Path, solid: TetMesh, anchors: Anchors | None) -> str:
+    """Write the template for the workers; returns the digest of what is in it."""
+    arrays: dict[str, NDArray[Any]] = {"V": solid.V, "T": solid.T}
+    if anchors is not None:
+        arrays |= {"landmark_faces": anchors.faces, "landmark_weights": anchors.weights}
+    found = hashlib.sha256()
+    for array in arrays.values():
+        found.update(np.ascontiguousarray(array).tobytes())
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        save_npz(file, arrays)
+    return found.hexdigest()

@@ -1,0 +1,164 @@
+"""The shapes of a population as they are given: solids, files or a folder; and their landmarks."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import as_reals
+from ..base.files import open_to_read
+from ..base.options import as_path
+from ..errors import ArrayError, LandmarkError, OptionError
+from ..io.numbers import read_numbers
+from ..io.read_write import read_solid, suffixes
+from ..mesh.given import as_solid
+from ..mesh.meshes import TetMesh
+
+__all__ = ["Shape", "gather_landmarks", "gather_shapes"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One shape, read when it is needed.
+
+    Attributes
+    ----------
+    name : str
+    source : Path or TetMesh
+    landmarks : Path, ndarray (l, 3) or None
+        A file that is missing is a fault of the shape.
+    """
+
+    name: str
+    source: Path | TetMesh = field(repr=False)
+    landmarks: Path | Array | None = field(default=None, repr=False)
+
+    def load(self) -> TetMesh:
+        """The solid.
+
+        Raises
+        ------
+        StretchmapError, OSError
+            It cannot be read, or is no solid torus.
+        """
+        solid = self.source if isinstance(self.source, TetMesh) else read_solid(self.source)
+        solid.require_solid_torus()
+        return solid
+
+    def load_landmarks(self) -> Array | None:
+        """Its landmarks (l, 3).
+
+        Raises
+        ------
+        LandmarkError, StretchmapError, OSError
+            They cannot be read.
+        """
+        if isinstance(self.landmarks, Path):
+            if not self.landmarks.exists():
+                raise LandmarkError(f"{self.name} has no landmarks: {self.landmarks} is not there")
+            return read_numbers(self.landmarks, {3: "x, y, z"})
+        return self.landmarks
+
+    def digest(self) -> str:
+        """Changes when what the shape is made of does."""
+        found = hashlib.sha256(self.name.encode())
+        for part in (self.source, self.landmarks):
+            if isinstance(part, Path):
+                try:
+                    with open_to_read(part) as file:
+                        while chunk := file.read(1 << 20):
+                            found.update(chunk)
+                except OSError as error:  # told when it is to be read
+                    found.update(str(error.errno).encode())
+            elif part is not None:
+                arrays = (part.V, part.T) if isinstance(part, TetMesh) else (part,)
+                for array in arrays:
+                    found.update(np.ascontiguousarray(array).tobytes())
+        return found.hexdigest()
+
+
+def gather_shapes(solids: Any) -> list[Shape]:
+    """Shapes from a folder, or a sequence or mapping of solids and paths.
+
+    Raises
+    ------
+    OptionError
+        It is none of these, the folder holds no mesh, or two shapes have one name.
+    KindError
+        An object is no solid.
+    FileNotFoundError
+        No such folder.
+    """
+    if isinstance(solids, (str, os.PathLike)):
+        folder = as_path(solids)
+        if not folder.is_dir():
+            raise FileNotFoundError(2, "no such folder", str(folder))
+        known = suffixes(solid=True)
+        found = sorted(p for p in folder.iterdir() if p.suffix.lower() in known and p.is_file())
+        if not found:
+            raise OptionError(f"{folder} holds no mesh of tets ({', '.join(known)})")
+        return gather_shapes([path for path in found if not path.name.startswith(".")])
+    if isinstance(solids, Mapping):
+        return _checked([_shape(entry, str(name)) for name, entry in solids.items()])
+    if not isinstance(solids, Sequence):
+        raise OptionError(
+            "solids must be a folder, or a sequence or mapping of solids and paths, got "
+            f"{type(solids).__name__}"
+        )
+    width = len(str(max(len(solids) - 1, 0)))
+    return _checked([_shape(entry, f"{i:0{width}d}") for i, entry in enumerate(solids)])
+
+
+def gather_landmarks(shapes: list[Shape], landmarks: Any) -> list[Shape]:
+    """The shapes with their landmarks: a folder of NAME.csv, a mapping by name, or an array.
+
+    Raises
+    ------
+    OptionError
+        None of these.
+    ArrayError, NonFiniteError
+        The array has another shape; a mapping lacks one.
+    """
+    if landmarks is None:
+        return shapes
+    marks: list[Any]
+    if isinstance(landmarks, (str, os.PathLike)):
+        folder = as_path(landmarks)
+        if not folder.is_dir():
+            raise FileNotFoundError(2, "no such folder", str(folder))
+        marks = [folder / f"{shape.name}.csv" for shape in shapes]
+    elif isinstance(landmarks, Mapping):
+        missing = [shape.name for shape in shapes if shape.name not in landmarks]
+        if missing:
+            raise ArrayError(f"landmarks: there are none of {', '.join(missing[:5])}")
+        marks = [as_reals(landmarks[s.name], f"landmarks[{s.name!r}]", (None, 3)) for s in shapes]
+    else:
+        marks = list(as_reals(landmarks, "landmarks", (len(shapes), None, 3)))
+    return [Shape(s.name, s.source, mark) for s, mark in zip(shapes, marks, strict=True)]
+
+
+def _shape(entry: Any, name: str) -> Shape:
+    if isinstance(entry, (str, os.PathLike)):
+        path = as_path(entry)
+        return Shape(path.stem if name.isdigit() else name, path)
+    return Shape(name, as_solid(entry, f"solids[{name}]"))
+
+
+def _checked(shapes: list[Shape]) -> list[Shape]:
+    names = [shape.name for shape in shapes]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise OptionError(f"two shapes are named {twice[0]!r}; pass a mapping from names to paths")
+    for name in names:
+        if not name or name.startswith(".") or any(c in name for c in "/\\\0"):
+            raise OptionError(f"{name!r} cannot be the name of a shape: files are named after it")
+    return shapes

@@ -1,0 +1,170 @@
+"""One step of a run: the template mapped onto one shape, as files.
+
+A task reads what it needs from the run folder and leaves a map and a record there, the record last.
+One that finds the record of the same inputs has nothing to do; so a run can be taken up again, and
+an executor may start a task twice.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._version import __version__
+from ..base.files import atomic_path
+from ..base.tables import plain_dict
+from ..base.threads import threads
+from ..errors import LandmarkError, StretchmapError
+from ..io.read_write import read_solid
+from .correspondence import Along, correspond
+from .fitting import Anchors, Template
+from .shapes import Shape
+
+__all__ = ["Job", "Record", "failed", "run_job"]
+
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What `run_job` needs; travels to other processes and machines.
+
+    Attributes
+    ----------
+    shape : Shape
+    folder : Path
+        Of the run; all workers see it.
+    round : int
+    template : str
+        Digest of the file ``template-ROUND.npz``.
+    warm : bool
+        Start from the map of the round before.
+    along, volume_weight
+        As in `correspond`.
+    """
+
+    shape: Shape
+    folder: Path = field(repr=False)
+    round: int
+    template: str = field(repr=False)
+    warm: bool
+    along: Along
+    volume_weight: float
+
+    @property
+    def map_file(self) -> Path:
+        """Of the latest round."""
+        return self.folder / "maps" / f"{self.shape.name}.npz"
+
+    @property
+    def image_file(self) -> Path:
+        """Where the template's vertices go in this round, and where smoothly."""
+        return self.folder / "images" / f"{self.shape.name}-{self.round}.npy"
+
+    @property
+    def image_before(self) -> Path:
+        """The same in the round before."""
+        return self.folder / "images" / f"{self.shape.name}-{self.round - 1}.npy"
+
+    @property
+    def record_file(self) -> Path:
+        """Of the shape in this round."""
+        return self.folder / "records" / f"{self.shape.name}-{self.round}.json"
+
+    def key(self) -> str:
+        """Digest of all that the outcome depends on."""
+        before = self.image_before
+        start = before.read_bytes() if self.warm and before.exists() else b""
+        text = (self.shape.digest(), self.template, hashlib.sha256(start).hexdigest(), __version__)
+        options = (self.round, self.along, self.volume_weight)
+        return hashlib.sha256(repr((text, options)).encode()).hexdigest()
+
+
+def run_job(job: Job) -> Record:
+    """Map the template onto the shape, unless it has been done; returns the record.
+
+    What is wrong with a shape goes into its record: one bad file does not end a run.
+    """
+    key = job.key()
+    done = _done(job, key)
+    if done is not None:
+        return done
+    clock = time.perf_counter()
+    try:
+        with threads(1):
+            record = _mapped(job)
+    except (StretchmapError, OSError, MemoryError) as error:
+        record = failed(job, f"{type(error).__name__}: {error}")
+    record |= {"key": key, "seconds": time.perf_counter() - clock}
+    _write(job, record)
+    return record
+
+
+def failed(job: Job, error: str) -> Record:
+    """The record of a shape that is skipped."""
+    return {"name": job.shape.name, "round": job.round, "ok": False, "error": error}
+
+
+def _mapped(job: Job) -> Record:
+    template = _template(job.folder / f"template-{job.round}.npz", job.template)
+    solid, marks = job.shape.load(), job.shape.load_landmarks()
+    if marks is not None and template.anchors is not None:
+        wanted = len(template.anchors.faces)
+        if len(marks) != wanted:
+            raise LandmarkError(f"{len(marks)} landmarks, the template has {wanted}")
+    start = None
+    if job.warm and job.image_before.exists():
+        start = np.load(job.image_before)[0, template.solid.boundary_vertices]
+    found = correspond(
+        template, solid, start=start, landmarks=marks, along=job.along,
+        volume_weight=job.volume_weight,
+    )  # fmt: skip
+    found.save(job.map_file)
+    with atomic_path(job.image_file) as temporary, open(temporary, "wb") as file:
+        np.save(file, np.stack([found.image[: template.solid.n_vertices], found.smooth]))
+    return {
+        "name": job.shape.name,
+        "round": job.round,
+        "ok": True,
+        "n_tets": solid.n_tets,
+        "volume": solid.volume,
+        "certified": found.certificate.certified,
+        "along": found.along,
+        "note": found.note,
+        "distance": found.distance,
+        "flips": found.distortion.flips,
+        "volume_ratio_std": found.distortion.element_std,
+    }
+
+
+@lru_cache(maxsize=2)
+def _template(path: Path, digest: str) -> Template:
+    """Read once by each process; the digest tells apart files of one name."""
+    solid = read_solid(path)
+    with np.load(path) as data:
+        if "landmark_faces" not in data:
+            return Template(solid)
+        weights: NDArray[np.float64] = data["landmark_weights"]
+        return Template(solid, Anchors(data["landmark_faces"], weights))
+
+
+def _done(job: Job, key: str) -> Record | None:
+    try:
+        record = json.loads(job.record_file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    same = isinstance(record, dict) and record.get("key") == key
+    return record if same and (not record.get("ok") or job.image_file.exists()) else None
+
+
+def _write(job: Job, record: Record) -> None:
+    with atomic_path(job.record_file) as temporary:
+        temporary.write_text(json.dumps(plain_dict(record), indent=1), encoding="utf-8")

@@ -1,0 +1,81 @@
+"""Fields on the mean: integrals, known differences found and others not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap.errors import ArrayError, OptionError
+
+
+@pytest.fixture(scope="module")
+def bones():
+    return sm.samples.vertebra_population(6, seed=2, n_tets=1500)
+
+
+@pytest.fixture(scope="module")
+def found(bones):
+    return sm.population.fit(bones.solids, max_rounds=1, tol=1.0)
+
+
+def fields(bones, found, change=0.0):
+    """A smooth field of the material; in the last three individuals raised in the body."""
+    noise = np.random.default_rng(0).normal(0.0, 0.02, 6)
+    out = {}
+    for name in found.names:
+        i = int(name)
+        x = bones.material[i][:, 0]
+        out[name] = 2.0 + 0.1 * x + noise[i] + (change * (x > 1.5) if i >= 3 else 0.0)
+    return out
+
+
+def test_integrals_are_conserved(bones, found):
+    for name, values in fields(bones, found).items():
+        solid = bones.solids[int(name)]
+        carried = sm.population.carry_field(found, name, values)
+        wanted = (solid.tet_volumes * values[solid.T].mean(axis=1)).sum()
+        assert carried @ found.mean.tet_volumes == pytest.approx(wanted, rel=1e-12)
+
+
+def test_values_are_carried_to_where_they_belong(bones, found):
+    statistics = sm.population.field_statistics(found, fields(bones, found), conserve="value")
+    # 0.1 per unit of length: an error of one percent of the size is 0.01.
+    assert np.median(statistics.std) < 0.05
+    assert 1.5 < statistics.mean.min() < statistics.mean.max() < 2.5
+    assert np.allclose(statistics.mean, statistics.values.mean(axis=0))
+
+
+def test_a_difference_of_groups_is_found_where_it_is(bones, found):
+    group = {name: "changed" if int(name) >= 3 else "control" for name in found.names}
+    changed, null = (
+        sm.population.field_statistics(
+            found, fields(bones, found, change), conserve="value", group=group
+        )
+        for change in (0.5, 0.0)
+    )
+    front = changed.values[3:].mean(axis=0) - changed.values[:3].mean(axis=0) > 0.4
+    assert 0.05 < front.mean() < 0.9
+    assert (changed.p_adjusted[front] < 0.05).mean() > 0.9
+    assert (changed.t[front] > 0.0).all()  # "changed" before "control"
+    assert (null.p_adjusted < 0.05).mean() < 0.05
+    assert (changed.p_adjusted >= changed.p).all()
+
+
+def test_a_field_that_does_not_vary_has_no_t(bones, found):
+    ones = {name: np.ones(bones.solids[int(name)].n_vertices) for name in found.names}
+    statistics = sm.population.field_statistics(found, ones, conserve="value", against=1.0)
+    assert np.isnan(statistics.t).all() and np.allclose(statistics.mean, 1.0)
+
+
+def test_what_does_not_fit_is_refused(bones, found):
+    good = fields(bones, found)
+    with pytest.raises(OptionError, match="no shape 'x'"):
+        sm.population.carry_field(found, "x", good["0"])
+    with pytest.raises(ArrayError):
+        sm.population.carry_field(found, "0", good["0"][:-1])
+    with pytest.raises(ArrayError, match="two shapes or more, got 1"):
+        sm.population.field_statistics(found, {"0": good["0"]})
+    for group in ({name: 0 for name in good}, {name: name for name in good}, {"0": 1}):
+        with pytest.raises(ArrayError):
+            sm.population.field_statistics(found, good, group=group)

@@ -1,0 +1,227 @@
+"""Whole runs: planted modes, resuming, bad files, workers that die, the same bits everywhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from population import dying
+from population.truth import correspondence_errors, material, mode_angles, size
+from stretchmap.errors import OptionError, SolverError
+from stretchmap.population.executors import WorkerLost, as_executor
+from stretchmap.population.shapes import gather_shapes
+
+ROUNDS = {"max_rounds": 2, "tol": 0.01}
+
+
+@pytest.fixture(scope="module")
+def bones():
+    return sm.samples.vertebra_population(6, seed=2, n_tets=2000)
+
+
+@pytest.fixture(scope="module")
+def folder(bones, tmp_path_factory):
+    """Four bones as files, and one that is none."""
+    place = tmp_path_factory.mktemp("bones")
+    for i, solid in enumerate(bones.solids[:4]):
+        sm.write(place / f"bone{i}.npz", solid)
+    (place / "bad.npz").write_bytes(b"no bone")
+    return place
+
+
+@pytest.fixture(scope="module")
+def serial(folder, tmp_path_factory):
+    return sm.population.fit(folder, folder=tmp_path_factory.mktemp("serial"), **ROUNDS)
+
+
+def same(one, other):
+    assert one.names == other.names and one.moved == other.moved
+    for name in ("correspondences", "aligned"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+    assert np.array_equal(one.mean.V, other.mean.V)
+
+
+def test_planted_modes_are_recovered(bones):
+    found = sm.population.fit(bones.solids, max_rounds=2, tol=0.01)
+    assert found.converged and found.certificate.certified and not found.skipped
+    assert all(r["certified"] and r["along"] == "smooth" for r in found.records)
+    assert found.mean.tet_volumes.min() > 0.0
+    errors, places = correspondence_errors(bones, found.correspondences)
+    assert np.median(errors) < 0.006
+    angles = mode_angles(bones, found.model, places.mean(axis=0))
+    assert (
+        angles[0] < 10.0 and angles[:3].max() < 20.0
+    )  # 2000 tets, and the weakest mode 0.5 % of it
+    assert found.outliers() == {}
+
+
+def test_a_bad_file_is_named_and_skipped(serial, folder):
+    assert set(serial.skipped) == {"bad"} and serial.names == ("bone0", "bone1", "bone2", "bone3")
+    assert "bad.npz" in serial.skipped["bad"]
+    assert "bad" in serial.summary()
+    record = json.loads((serial.folder / "records" / "bad-0.json").read_text())
+    assert record["ok"] is False and record["error"] == serial.skipped["bad"]
+
+
+def test_maps_are_kept(serial):
+    found = serial.map("bone2")
+    n = serial.mean.n_vertices
+    assert np.array_equal(found.image[:n], serial.correspondences[2])
+    assert sm.certify(found.mesh, found.image).certified
+    with pytest.raises(OptionError, match="bone9"):
+        serial.map("bone9")
+
+
+def test_a_finished_run_is_taken_up_as_it_is(serial, folder):
+    times = {p: p.stat().st_mtime_ns for p in (serial.folder / "images").iterdir()}
+    again = sm.population.fit(folder, folder=serial.folder, **ROUNDS)
+    same(serial, again)
+    assert times == {p: p.stat().st_mtime_ns for p in (serial.folder / "images").iterdir()}
+
+
+def test_a_run_killed_goes_on_with_the_same_bits(serial, folder, tmp_path):
+    script = (
+        "import sys, stretchmap as sm\n"
+        f"sm.population.fit(sys.argv[1], folder=sys.argv[2], **{ROUNDS!r})\n"
+    )
+    run = subprocess.Popen(
+        [sys.executable, "-c", script, str(folder), str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )
+    while not (tmp_path / "records" / "bone1-0.json").exists():
+        assert run.poll() is None
+        time.sleep(0.01)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    done = sorted(p.name for p in (tmp_path / "records").iterdir())
+    assert "bone3-1.json" not in done  # it was not over
+    same(serial, sm.population.fit(folder, folder=tmp_path, **ROUNDS))
+
+
+def test_a_pool_of_processes_gives_the_same_bits(serial, folder, tmp_path):
+    same(serial, sm.population.fit(folder, folder=tmp_path, executor="processes:2", **ROUNDS))
+
+
+def test_a_worker_that_dies_is_replaced(tmp_path):
+    jobs = [tmp_path / str(i) for i in range(5)]
+    outcomes = dict(as_executor("processes:2").run(dying.die_once_at_two, jobs))
+    assert outcomes == {i: str(i) for i in range(5)}
+
+
+def test_a_job_that_kills_its_worker_is_given_up_and_the_others_are_not(tmp_path):
+    jobs = [tmp_path / str(i) for i in range(5)]
+    outcomes = dict(as_executor("processes:2").run(dying.die_at_two, jobs))
+    assert isinstance(outcomes.pop(2), WorkerLost)
+    assert outcomes == {i: str(i) for i in (0, 1, 3, 4)}
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_with_a_worker_killed_gives_the_same_bits(serial, folder, tmp_path):
+    if importlib.util.find_spec("distributed") is None:
+        pytest.skip("distributed is not installed")
+    import distributed
+
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        killed = []
+
+        def kill(stage, done, total, **values):
+            if not killed:
+                os.kill(pids[0], signal.SIGKILL)
+                killed.append(pids[0])
+
+        found = sm.population.fit(folder, folder=tmp_path, executor=client, progress=kill, **ROUNDS)
+        assert killed and killed[0] not in client.run(os.getpid).values()
+    same(serial, found)
+
+
+def test_landmarks_and_a_template_of_its_own(bones, tmp_path):
+    names = [f"b{i}" for i in range(3)]
+    template, points = (
+        bones.reference,
+        bones.reference.V[bones.reference.boundary_vertices[[0, 40]]],
+    )
+    for i, name in enumerate(names):
+        np.savetxt(tmp_path / f"{name}.csv", bones.place(i, points), delimiter=",")
+    np.savetxt(tmp_path / "template.csv", points, delimiter=",")
+    solids = dict(zip(names, bones.solids, strict=False))
+    found = sm.population.fit(solids, template, tmp_path, max_rounds=1, tol=1.0)
+    assert found.names == tuple(names) and found.mean.n_tets == template.n_tets
+    (tmp_path / "b1.csv").unlink()
+    found = sm.population.fit(solids, template, tmp_path, max_rounds=1, tol=1.0)
+    assert found.names == ("b0", "b2") and "no landmarks" in found.skipped["b1"]
+
+
+def test_solids_of_the_population(serial):
+    assert np.allclose(serial.mode(0, 0.0).V, serial.mean.V)
+    two = serial.mode(0, 2.0)
+    deviation = np.sqrt(serial.model.variances[0])
+    assert np.linalg.norm(two.V - serial.mean.V) == pytest.approx(2.0 * deviation)
+    assert np.allclose(serial.reconstruct(serial.model.scores[1]).V, serial.aligned[1])
+    assert len(serial.sample(3, seed=1)) == 3
+    with pytest.raises(OptionError, match="modes"):
+        serial.mode(99, 1.0)
+
+
+def test_what_is_saved_can_be_read(serial, tmp_path):
+    serial.save(tmp_path / "population.npz")
+    with np.load(tmp_path / "population.npz") as data:
+        assert np.array_equal(data["correspondences"], serial.correspondences)
+        assert json.loads(str(data["meta"]))["skipped"].keys() == {"bad"}
+
+
+@pytest.mark.slow
+def test_an_outlier_is_named(serial):
+    odd = sm.samples.bumpy_torus(1500)
+    assert serial.outliers(threshold=1e-6)  # somebody is always farthest
+    solids = {f"ring{i}": sm.samples.solid_torus(600 + 100 * i) for i in range(5)} | {"odd": odd}
+    found = sm.population.fit(solids, max_rounds=1, tol=1.0)
+    assert list(found.outliers()) == ["odd"]
+
+
+def test_shapes_are_found_and_named(tmp_path, bones):
+    assert [s.name for s in gather_shapes(list(bones.solids[:2]))] == ["0", "1"]
+    with pytest.raises(OptionError, match="holds no mesh"):
+        gather_shapes(tmp_path)
+    with pytest.raises(OptionError, match="two shapes are named 'a'"):
+        gather_shapes([tmp_path / "a.npz", tmp_path / "b" / "a.msh"])
+    with pytest.raises(FileNotFoundError):
+        gather_shapes(tmp_path / "nowhere")
+    for bad in (3, {"": bones.solids[0]}, {"a/b": bones.solids[0]}):
+        with pytest.raises(OptionError):
+            gather_shapes(bad)
+
+
+def test_runs_that_cannot_be(serial, folder, bones):
+    with pytest.raises(OptionError, match="other settings"):
+        sm.population.fit(folder, folder=serial.folder, along="area")
+    with pytest.raises(SolverError, match="two are needed"):
+        sm.population.fit(bones.solids[:1])
+    with pytest.raises(SolverError, match="no shape can be read"):
+        sm.population.fit([Path("nowhere.npz"), Path("nothing.npz")])
+    for options in (
+        {"along": "both"}, {"tol": -1.0}, {"max_rounds": 0}, {"executor": "cloud"}, {"scale": 1},
+        {"volume_weight": 0.0}, {"executor": "processes:x"},
+    ):  # fmt: skip
+        with pytest.raises(OptionError):
+            sm.population.fit(bones.solids, **options)
+
+
+def test_material_points_are_found_again(bones):
+    points = bones.solids[1].V
+    assert np.abs(material(bones, 1, points) - bones.material[1]).max() < 1e-9 * size(points)
