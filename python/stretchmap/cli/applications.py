@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from ..maps.files import LoadedMap
     from ..mesh.meshes import TetMesh
 
+_WITHIN = 0.1  # as that of read_landmarks, which takes long to import
+
 _log = logging.getLogger("stretchmap")
 
 
@@ -52,6 +54,10 @@ def register_solids(
             show_default=False,
         ),
     ] = None,
+    within: Annotated[
+        float,
+        typer.Option(help="Farthest a landmark may be off, as a share of the solid's diagonal."),
+    ] = _WITHIN,
     landmark_map: Annotated[
         Spread, typer.Option("--landmark-map", help="How landmarks are reached on the surface.")
     ] = Spread.smooth,
@@ -69,18 +75,20 @@ def register_solids(
     Both are solid tori. Volumes keep their shares, no tet is flipped, and the map is certified.
     """
     from ..base.progress import terminal
+    from ..registration.landmarks import read_landmarks
     from ..registration.map import register as register_meshes
 
     inputs = [path for path in (input, target, landmarks) if path is not None]
     common.check_outputs(output, common.map_suffixes(), json, *inputs)
     watch = common.Stopwatch()
     source, goal = (_solid_torus(path, orient, compact) for path in (input, target))
+    marks = None if landmarks is None else read_landmarks(landmarks, source, goal, within=within)
     watch.lap("read")
     with terminal(quiet) as bar:
         result = register_meshes(
             source,
             goal,
-            landmarks,
+            marks,
             landmark_map=landmark_map.value,
             keep_best=keep_best,
             progress=bar,

@@ -13,12 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
+from ..base.arrays import describe
 from ..base.options import real
-from ..errors import MissingDependencyError, SolverError
+from ..errors import MissingDependencyError, SelfIntersectionError, SolverError
 from .given import as_surface
 from .meshes import TetMesh, TriMesh
 
 __all__ = ["tetrahedralize"]
+
+_MOST_PAIRS = 1000
 
 
 def tetrahedralize(
@@ -47,8 +51,10 @@ def tetrahedralize(
         If the ``tetgen`` package is not installed.
     OptionError
         If ``max_volume`` or ``quality`` is out of range.
+    SelfIntersectionError
+        If the surface crosses itself; ``ids`` are the faces.
     SolverError
-        If the surface cannot be filled, as when it crosses itself, or was changed.
+        If the surface cannot be filled otherwise, or was changed.
 
     Notes
     -----
@@ -71,16 +77,52 @@ def tetrahedralize(
     options: dict[str, Any] = {"minratio": quality}
     if max_volume is not None:
         options |= {"fixedvolume": True, "maxvolume": max_volume}
-    filled = _run_tetgen(surface, options)
-    solid = TetMesh(filled[0], filled[1], orient=True)
-    n = len(surface.V)
-    if not (
-        np.array_equal(solid.V[:n], surface.V)
-        and np.array_equal(solid.boundary_vertices, np.arange(n))
-        and len(solid.surface.F) == len(surface.F)
-    ):
-        raise SolverError("filling the surface with tets changed it")
+    try:
+        solid = TetMesh(*_run_tetgen(surface, options), orient=True)
+        _require_same_surface(solid, surface)
+    except SolverError:
+        _require_no_crossing(surface)  # the reason, as a rule
+        raise
     return solid
+
+
+def _require_same_surface(solid: TetMesh, surface: TriMesh) -> None:
+    n, ids = len(surface.V), solid.boundary_vertices
+    unused = np.setdiff1d(np.arange(n), surface.F)
+    if len(unused):
+        raise SolverError(
+            f"no face uses {describe('vertex', unused)}; surface.compact() drops what is not used",
+            unused.tolist(),
+        )
+    if not np.array_equal(solid.V[:n], surface.V):
+        raise SolverError("filling the surface with tets moved its vertices")
+    if added := int((ids >= n).sum()):
+        raise SolverError(f"filling the surface with tets added {added} vertices to it")
+    missing = np.setdiff1d(np.arange(n), ids)
+    if len(missing):
+        raise SolverError(
+            f"filling the surface with tets left {describe('vertex', missing)} off the boundary",
+            missing.tolist(),
+        )
+    rows = np.sort(np.vstack([ids[solid.surface.F], surface.F]), axis=1)
+    label = np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1)
+    n_found = len(solid.surface.F)
+    lost = np.flatnonzero(~np.isin(label[n_found:], label[:n_found]))
+    if len(lost) or n_found != len(surface.F):
+        raise SolverError(
+            f"filling the surface with tets replaced {describe('face', lost)} of it", lost.tolist()
+        )
+
+
+def _require_no_crossing(surface: TriMesh) -> None:
+    pairs = _core.certificate.crossing_faces(surface.V, surface.F, _MOST_PAIRS)
+    if len(pairs):
+        ids = np.unique(pairs)
+        raise SelfIntersectionError(
+            f"the surface crosses itself at {describe('face', ids)} and cannot be filled with "
+            "tets; repair it there, or let stretchmap prepare do so",
+            ids.tolist(),
+        )
 
 
 def _run_tetgen(
@@ -104,7 +146,7 @@ def _run_tetgen(
         )
         if run.returncode != 0:
             raise SolverError(
-                "the surface cannot be filled with tets; it may cross itself "
+                "the surface cannot be filled with tets "
                 f"({(run.stderr.strip().splitlines() or ['tetgen gave up'])[-1]})"
             )
         with np.load(Path(folder, "solid.npz")) as solid:

@@ -225,7 +225,7 @@ class _Run:
         if is_even and self._filler == "tetgen":
             try:
                 solid = tetrahedralize(surface, _TET * edge**3 / (6.0 * 2.0**0.5))
-            except SolverError as error:
+            except (SolverError, SelfIntersectionError) as error:
                 if not self._rescue:
                     raise SolverError(f"{error}; ask for more faces", error.ids) from error
         if solid is None:

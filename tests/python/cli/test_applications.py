@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 
 import numpy as np
@@ -105,6 +106,22 @@ def test_register_command_names_bad_landmarks(folder, capsys):
                "-o", folder / "bad.npz")  # fmt: skip
     assert code == 2 and not (folder / "bad.npz").exists()
     assert "bad.csv, line 2: 'x' is not a finite number" in capsys.readouterr().err
+
+
+def test_register_command_takes_how_far_landmarks_may_be_off(folder, capsys):
+    a, b = sm.read(folder / "a.npz"), sm.read(folder / "b.npz")
+    at = np.hstack([a.surface.V[:1] + 0.3 * np.ptp(a.V, axis=0), b.surface.V[:1]])
+    np.savetxt(folder / "far.csv", at, delimiter=",")
+    arguments = ("register", folder / "a.npz", folder / "b.npz", "--landmarks", folder / "far.csv",
+                 "-o", folder / "far.npz")  # fmt: skip
+    assert run(*arguments) == 2
+    assert "within" in capsys.readouterr().err
+    assert run(*arguments, "--within", "0") == 2
+    assert "within must be above 0" in capsys.readouterr().err
+    assert len(sm.read_landmarks(folder / "far.csv", a, b, within=0.9)) == 1
+    assert inspect.signature(sm.read_landmarks).parameters["within"].default == 0.1
+    assert run(*arguments, "--within", "0.9", "--keep-best") in (0, 1)
+    assert (folder / "far.npz").exists()
 
 
 @pytest.mark.parametrize(

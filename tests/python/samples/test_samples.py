@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from stretchmap import TetMesh, TriMesh, samples
-from stretchmap.errors import MissingDependencyError, OptionError, SolverError
+from stretchmap.errors import (
+    MissingDependencyError,
+    OptionError,
+    SelfIntersectionError,
+    SolverError,
+)
 
 SOLID_TORI = {
     "standard": samples.solid_torus,
@@ -167,8 +172,19 @@ def test_tetrahedralize_refuses_a_surface_that_crosses_itself():
     surface = samples.torus_surface(30, 12)
     V = surface.V.copy()
     V[0] = -V[0]
-    with pytest.raises(SolverError):
+    with pytest.raises(SelfIntersectionError, match="crosses itself at") as caught:
         samples.tetrahedralize(TriMesh(V, surface.F))
+    assert np.isin(0, surface.F[list(caught.value.ids)])
+    assert set(caught.value.ids) <= set(range(surface.n_faces))
+
+
+def test_tetrahedralize_says_what_it_could_not_keep():
+    pytest.importorskip("tetgen")
+    surface = samples.torus_surface(30, 12)
+    inner = 0.5 * (surface.V - [3, 0, 0]) + [9, 0, 0]
+    loose = TriMesh(np.vstack([surface.V, inner[:1]]), surface.F)
+    with pytest.raises(SolverError, match=r"vertex 360; surface\.compact"):
+        samples.tetrahedralize(loose)
 
 
 def test_tetrahedralize_names_the_package_that_is_missing(monkeypatch):
