@@ -65,6 +65,15 @@ def test_numbers_beyond_double_precision():
         as_points(np.full((4, 3), np.longdouble(1e300) * 1e100))
 
 
+def test_coordinates_whose_volumes_are_no_numbers():
+    points = np.zeros((4, 3))
+    points[2] = 1e46
+    with pytest.raises(ArrayError, match=r"V has coordinates beyond 1e\+45 at vertex 2") as caught:
+        as_points(points)
+    assert caught.value.ids == (2,)
+    as_points(0.01 * points)
+
+
 def test_shapes():
     assert as_reals(GRID.astype(np.float32), "a", (None, 3)).dtype == np.float64
     assert as_reals(GRID.T[::2], "a", (2, 4)).flags.c_contiguous

@@ -165,6 +165,8 @@ def test_saving(bumpy_map, tmp_path):
     "options",
     [
         {"fractions": 1},
+        {"fractions": 10**9},
+        {"fractions": (10**5, 10**5), "by": ("u", "s")},
         {"fractions": [0.5, 0.6]},
         {"fractions": [1.5, -0.5]},
         {"fractions": [[0.5], [0.5]]},

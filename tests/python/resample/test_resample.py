@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -123,6 +125,23 @@ def test_the_size_wanted_is_met(bumpy_map):
     assert 0.8 < len(by_size.H) / 700 < 1.25
     with pytest.raises(OptionError, match="not both"):
         hex_mesh(bumpy_map, target_size=size, n_hexahedra=700)
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"sections": 2**31},
+        {"sections": 2**31 - 1},
+        {"sections": 10**5, "block": 10**4, "rings": 10**4},
+        {"n_hexahedra": 10**12},
+        {"target_size": 1e-9},
+    ],
+)
+def test_grids_larger_than_memory_are_refused_at_once(standard, numbers):
+    start = time.process_time()
+    with pytest.raises(OptionError, match=r"GiB|at most"):
+        sm.hex_mesh(standard, **numbers)
+    assert time.process_time() - start < 2.0
 
 
 def test_bad_input_is_named(standard, registered):
