@@ -57,6 +57,7 @@ def finish_areas(
     tol: float,
     shape_budget: float,
     progress: Progress | None,
+    balance: float = 1.0,
 ) -> tuple[list[IterationRecord], bool, str]:
     """Newton steps on the polyhedral areas: records, converged, reason.
 
@@ -64,7 +65,7 @@ def finish_areas(
     """
     start = time.perf_counter()
     history: list[IterationRecord] = []
-    weight, least = 1.0, math.inf
+    weight, least, heaviest = 1.0, math.inf, _MOST_WEIGHT**balance
     barrier = _FACING if newton.least_facing() > 0.0 else 0.0
     taken = None
     at_rest = _rest()
@@ -73,12 +74,12 @@ def finish_areas(
         if iteration:
             taken = newton.step(1.0, _SHAPE / weight, _CHART / weight, barrier / weight, 0.0)
             if taken.step >= _FULL_STEP:
-                weight = min(weight * _GROWTH, _MOST_WEIGHT)
+                weight = min(weight * _GROWTH, heaviest)
         figures = newton.figures()
         least = min(least, figures.angle_mean)
         history.append(_record("newton", iteration, taken, figures, start))
         report(progress, "area", iteration, max_iter, face_sd=figures.face_sd)
-        if figures.face_sd <= _MARGIN * tol and _within(figures, tol):
+        if balance == 1.0 and figures.face_sd <= _MARGIN * tol and _within(figures, tol):
             break
         if taken is not None and at_rest(taken):
             reason = "no step lowers the energy" if taken.step == 0.0 else "energy at rest"
@@ -86,6 +87,8 @@ def finish_areas(
         if figures.face_sd <= _FAIR * tol and figures.angle_mean > shape_budget * least:
             reason = "shape budget spent"
             break
+    if balance < 1.0:
+        return history, reason == "energy at rest" and history[-1].flips == 0, reason
     weight = min(weight, _RING_WEIGHT)
     if rings and newton.project_rings(
         1.0, _SHAPE / weight, _CHART / weight, barrier / weight, tol, _RATIO_GOAL * tol

@@ -141,6 +141,7 @@ def area_map(
     max_iter: int = 100,
     tol: float = 5e-3,
     shape_budget: float = 1.2,
+    balance: float = 1.0,
     sem_iter: int = 10,
     keep_best: bool = False,
     threads: int | None = None,
@@ -181,6 +182,10 @@ def area_map(
         Once the face SD is below 4 ``tol``, the Newton steps end where the mean angle distortion
         exceeds the least seen by this factor: on regular triangulations the last per cent of area
         is paid for with needles.
+    balance : float
+        From 0, the Newton steps keep shapes as well as areas, to 1, areas alone: the power to which
+        the largest weight of the area term is raised. Below 1 they end where the energy is at rest,
+        no matter what ``tol`` is, and rings are left as they come.
     sem_iter : int
         Most steps of stretch energy minimisation.
     keep_best : bool
@@ -224,6 +229,7 @@ def area_map(
     surface = as_surface(surface)
     _check_options(torus, phase, ratio, finish)
     _check_numbers(max_iter, tol, shape_budget, sem_iter)
+    balance = real("balance", balance, 0.0, 1.0)
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     if basis is not None:
@@ -262,8 +268,9 @@ def area_map(
         newton = _core.area.SurfaceNewton(_core.area.GlideProblem(chart, reference, ratio), angles)
         history += unfold_faces(newton, progress)
         records, converged, reason = finish_areas(
-            newton, finish == "ring", max_iter, tol, shape_budget, progress
-        )
+            newton, finish == "ring", max_iter, tol,
+            shape_budget if balance == 1.0 else math.inf, progress, balance,
+        )  # fmt: skip
         history += records
         angles = newton.angles
     clock = _lap(seconds, "finish", clock)

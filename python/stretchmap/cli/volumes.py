@@ -67,6 +67,10 @@ def volume(
     c: Annotated[
         float | None, typer.Option("--c", help="Regularisation (5.6) of vsem, dimensionless.")
     ] = None,
+    balance: Annotated[
+        float | None,
+        typer.Option(help="From 0, pieces keep their shape, to 1 (default), their volume."),
+    ] = None,
     max_iter: MaxIter = None,
     tol: Annotated[
         float | None,
@@ -124,8 +128,8 @@ def volume(
     watch.lap("read")
     with terminal(quiet) as bar:
         result = volume_map(
-            solid, c=c, max_iter=max_iter, options=options, keep_best=keep_best, threads=threads,
-            progress=bar, **route,
+            solid, c=c, balance=balance, max_iter=max_iter, options=options, keep_best=keep_best,
+            threads=threads, progress=bar, **route,
         )  # fmt: skip
     watch.lap(**result.seconds)
     conclude(result.with_fields(*fields), output, json, quiet, watch)

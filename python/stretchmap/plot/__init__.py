@@ -18,7 +18,7 @@ from ..errors import FileFormatError, OptionError
 from ..maps.given import as_map
 from ..maps.result import Kind, MapResult
 from ..mesh.meshes import TetMesh
-from .comparisons import comparison
+from .comparisons import comparison, tradeoff
 from .pairs import registration
 from .solids import cutaway, levels
 from .statistics import convergence, ratios
@@ -42,6 +42,7 @@ __all__ = [
     "ratios",
     "registration",
     "save",
+    "tradeoff",
 ]
 
 KINDS: dict[Kind, Callable[..., Figure]] = {

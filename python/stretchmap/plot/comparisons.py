@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.options import instance
 from ..certificate.comparison import Comparison
+from ..errors import OptionError
+from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .style import BLACK, BLUE, empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["comparison"]
+__all__ = ["comparison", "tradeoff"]
 
 _RANGE = (0.0, 2.0)  # ratios beyond are counted at the ends
 
@@ -64,4 +67,53 @@ def comparison(found: Comparison) -> Figure:
     what = "volume" if isinstance(found.mesh, TetMesh) else "area"
     rows[-1].set_xlim(*_RANGE)
     rows[-1].set_xlabel(f"{what} ratio, image over source, mean 1 (end bins hold what lies beyond)")
+    return figure
+
+
+def tradeoff(maps: Mapping[float, MapResult]) -> Figure:
+    """What a map costs in shape for what it gains in volume: SD of the ratios by angle distortion.
+
+    Parameters
+    ----------
+    maps : mapping
+        Map for each value of ``balance``, see `volume_map`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    OptionError
+        Fewer than two maps.
+    MissingDependencyError
+        matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> solid = sm.samples.bumpy_torus(600)
+    >>> maps = {b: sm.volume_map(solid, balance=b) for b in (0.0, 1.0)}
+    >>> len(sm.plot.tradeoff(maps).axes)
+    1
+    """
+    if not isinstance(maps, Mapping) or len(maps) < 2:
+        raise OptionError("maps must be a mapping of two or more values of balance to their maps")
+    found = {
+        float(balance): instance("maps", maps[balance], MapResult, "maps of this package")
+        for balance in sorted(maps)
+    }
+    figure = empty_figure(6.0, 4.0)
+    axes = figure.subplots()
+    angle = [result.distortion.angle_mean for result in found.values()]
+    spread = [result.distortion.element_std for result in found.values()]
+    axes.plot(angle, spread, marker="o", color=BLUE)
+    for balance, x, y in zip(found, angle, spread, strict=True):
+        axes.annotate(
+            f"{balance:g}", (x, y), xytext=(5, 5), textcoords="offset points", color=BLACK
+        )
+    axes.set_yscale("log")
+    axes.set_xlabel("angle distortion, mean (1: shapes kept)")
+    axes.set_ylabel("SD of the size ratios")
+    axes.set_title("numbers: balance, 0 shape to 1 volume", loc="left", fontsize=10)
     return figure

@@ -224,11 +224,11 @@ def _release(run: _Run) -> bool:
 
 def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNewton | None]:
     o, history = run.options, run.history
-    goal = o.frozen_weight if glide else o.volume_weight
+    goal = min(o.frozen_weight, o.volume_weight) if glide else o.volume_weight
     converged, reason, newton = False, "", None
     if not (run.problem.warm and glide):
         with run.timed("frozen"):
-            first = o.volume_weight if run.problem.warm else 1.0
+            first = o.volume_weight if run.problem.warm else min(1.0, goal)
             done = minimize(history.model, run.x, history, glide=False, start=first, goal=goal)
         run.x, converged, reason, newton = done.x, done.converged, done.reason, done.newton
     if glide:

@@ -30,7 +30,7 @@ from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
 from .engine import require_certified, solve
 from .model import Budget
-from .options import VolumeOptions
+from .options import VolumeOptions, weight_at
 from .problem import Outcome, VolumeProblem
 from .vsem import run_vsem
 
@@ -130,6 +130,7 @@ def volume_map(
     method: Literal["certified", "vsem"] | None = None,
     boundary: Literal["glide", "frozen"] | None = None,
     c: float | None = None,
+    balance: float | None = None,
     max_iter: int | None = None,
     start: AreaMap | VolumeMap | LoadedMap | None = None,
     options: VolumeOptions | None = None,
@@ -154,6 +155,10 @@ def volume_map(
         ``"frozen"`` keeps them where the area-preserving map put them.
     c : float, optional
         Regularization constant of (5.6) of the ``"vsem"`` method, dimensionless, default 0.
+    balance : float, optional
+        Certified route only: from 0, pieces keep their shape, to 1, they keep their volume
+        (default). The volume term weighs ``10^(6 balance - 2)`` times the shape term; below 1 the
+        volumes between level surfaces are left as they come.
     max_iter : int, optional
         Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
     start : AreaMap, VolumeMap or LoadedMap, optional
@@ -201,6 +206,14 @@ def volume_map(
     >>> bool(abs(result.distortion.image_total / solid.volume - 1.0) < 1e-12)
     True
 
+    Between shape and volume:
+
+    >>> shape = sm.volume_map(solid, balance=0.0).distortion
+    >>> shape.angle_mean < result.distortion.angle_mean
+    True
+    >>> shape.element_std > result.distortion.element_std
+    True
+
     Algorithm 5.1 as it is in the paper:
 
     >>> sm.volume_map(solid, c=10.0, max_iter=5).history[-1].stage
@@ -211,6 +224,8 @@ def volume_map(
         method = "certified" if c is None else "vsem"
     options = VolumeOptions() if options is None else options
     _check_options(method, boundary, c, max_iter, options)
+    if balance is not None:
+        options = _balanced(method, balance, options)
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     if solid.n_tets > _LARGE:
@@ -309,6 +324,19 @@ def _check_options(
         real("c", c, 0.0)
     if max_iter is not None:
         whole("max_iter", max_iter, 0)
+
+
+def _balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOptions:
+    balance = real("balance", balance, 0.0, 1.0)
+    if method == "vsem":
+        raise OptionError("balance belongs to the certified route; leave c and method out")
+    if options.volume_weight != VolumeOptions.volume_weight:
+        raise OptionError("give balance or options.volume_weight, not both")
+    if balance == 1.0:
+        return options
+    return dataclasses.replace(
+        options, volume_weight=weight_at(balance), target_iter=0, shift_iter=0
+    )
 
 
 def _boundary_maps(

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from ..area.search import Ratio
 from ..base.options import SOLVERS, flag, one_of, real, whole
 
-__all__ = ["FillOptions", "VolumeOptions"]
+__all__ = ["FillOptions", "VolumeOptions", "weight_at"]
+
+
+_LEAST_WEIGHT, _MOST_WEIGHT = 1e-2, 1e4  # of the volume term; beyond them nothing changes
+
+
+def weight_at(balance: float) -> float:
+    """``volume_weight`` between pure shape, 0, and pure volume, 1."""
+    return float(_LEAST_WEIGHT * (_MOST_WEIGHT / _LEAST_WEIGHT) ** balance)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +73,7 @@ class FillOptions:
 
     refine: bool = True
     time_limit: float = 1e-3
-    volume_weight: float = 1e4
+    volume_weight: float = _MOST_WEIGHT
     growth: float = 2.0
     max_aspect: float = 6.0
     floor: float = 0.02
