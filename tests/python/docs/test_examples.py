@@ -17,6 +17,7 @@ _OUTPUT = {
     "04_register_vertebrae": "registration.npz",
     "05_morph_and_transfer": "morph.pvd",
     "06_compare_methods": "comparison.png",
+    "07_population": "population.npz",
 }
 
 
