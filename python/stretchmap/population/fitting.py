@@ -65,15 +65,18 @@ class Template:
     solid : TetMesh
     anchors : Anchors or None
         Its landmarks.
+    n_sites : int
+        Of the spline.
     """
 
     solid: TetMesh
     anchors: Anchors | None = None
+    n_sites: int = _SITES
 
     @cached_property
     def spline(self) -> ThinPlate:
         """Sites on the surface, where forces act."""
-        return ThinPlate.of(self.solid.surface.V, _SITES)
+        return ThinPlate.of(self.solid.surface.V, self.n_sites)
 
     @cached_property
     def features(self) -> Array:
@@ -83,9 +86,7 @@ class Template:
     @cached_property
     def coarse(self) -> Template:
         """The same with a spline of few sites."""
-        found = Template(self.solid, self.anchors)
-        found.__dict__["spline"] = ThinPlate.of(self.solid.surface.V, _FEW_SITES)
-        return found
+        return Template(self.solid, self.anchors, _FEW_SITES)
 
     @cached_property
     def ring_mean(self) -> sp.csr_matrix:

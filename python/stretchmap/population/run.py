@@ -26,6 +26,7 @@ from ..errors import OptionError, SolverError, StretchmapError
 from ..io.npz import save_npz
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
+from ..mesh.refinement import refine_overconstrained
 from ..volume.fill import fill
 from ..volume.options import FillOptions
 from .correspondence import Along
@@ -72,7 +73,8 @@ def fit(
     solids : folder, or sequence or mapping of TetMesh and paths
         Solid tori. Files are read one at a time, when their turn comes.
     template : TetMesh, name of a shape, or path, optional
-        Where to start; the first shape that can be read by default. Its mesh is that of the result.
+        Where to start; the first shape that can be read by default. Its mesh is that of the result,
+        with vertices put in after its own where the boundary alone would decide about a tet.
     landmarks : folder of NAME.csv, mapping by name, or array_like (k, l, 3), optional
         Points on the surfaces that correspond. A template that is none of the shapes has its own
         under the name ``"template"``.
@@ -131,6 +133,9 @@ def fit(
     workers = as_executor(executor)
     shapes = gather_landmarks(gather_shapes(solids), landmarks)
     solid, marks = _start(shapes, template, landmarks)
+    # Where all corners of a tet lie on the boundary only new vertices inside can keep it upright;
+    # put in once they are in every map and in the mean.
+    solid = refine_overconstrained(solid).solid
     with ExitStack() as stack:
         place = as_path(folder or stack.enter_context(tempfile.TemporaryDirectory()))
         _prepare(place, {"along": along, "scale": scale, "volume_weight": volume_weight})

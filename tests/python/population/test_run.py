@@ -20,6 +20,7 @@ from population.truth import correspondence_errors, material, mode_angles, size
 from stretchmap.errors import OptionError, SolverError
 from stretchmap.population.executors import WorkerLost, as_executor
 from stretchmap.population.shapes import gather_shapes
+from stretchmap.samples.solids import _cells
 
 ROUNDS = {"max_rounds": 2, "tol": 0.01}
 
@@ -165,6 +166,18 @@ def test_landmarks_and_a_template_of_its_own(bones, tmp_path):
     (tmp_path / "b1.csv").unlink()
     found = sm.population.fit(solids, template, tmp_path, max_rounds=1, tol=1.0)
     assert found.names == ("b0", "b2") and "no landmarks" in found.skipped["b1"]
+
+
+def test_tets_that_the_boundary_alone_decides_about_are_split():
+    cells = np.ones((3, 3, 1), bool)
+    cells[1, 1] = False
+    V, T = _cells(cells.repeat(2, 0).repeat(2, 1))
+    solids = [sm.TetMesh(V * [1.0 + 0.1 * i, 1.0, 0.7 + 0.2 * i], T) for i in range(3)]
+    assert len(solids[0].boundary_vertices) == solids[0].n_vertices
+    found = sm.population.fit(solids, max_rounds=1, tol=1.0)
+    added = found.mean.n_vertices - solids[0].n_vertices
+    assert added > 0 and len(found.correspondences) == 3
+    assert found.certificate.certified and found.mean.tet_volumes.min() > 0.0
 
 
 def test_solids_of_the_population(serial):
