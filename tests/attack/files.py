@@ -9,6 +9,7 @@ system's. What went wrong is printed as it happens, the last line counts.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import logging
 import sys
 import tempfile
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import watch
-from formats import FORMATS, SLOW, misread, sound
+from formats import FORMATS, NEEDS, SLOW, misread, sound
 from mutation import mutant
 
 LIMIT = 20.0  # seconds for one file
@@ -78,7 +79,10 @@ def main() -> int:
     if options.worker:
         serve()
         return 0
-    names = [name for name in FORMATS if options.only in name]
+    wanted = [name for name in FORMATS if options.only in name]
+    names = [n for n in wanted if n not in NEEDS or importlib.util.find_spec(NEEDS[n])]
+    if left_out := sorted(set(wanted) - set(names)):
+        print(f"not installed, hence left out: {', '.join(left_out)}")
     first = options.seed * 1_000_000
     jobs: list[list[str | int]] = []
     for name in names:

@@ -269,6 +269,10 @@ FORMATS: dict[str, Format] = {
 
 # Each of their files takes a process that loads VTK.
 SLOW = ("vtp", "vtk of a surface")
+# Packages without which there is no sound file, or no reader.
+_BY_MESHIO = {name for name in FORMATS if name.split()[0] in ("msh", "vtk", "vtu", "mesh")}
+NEEDS = dict.fromkeys(_BY_MESHIO, "meshio") | dict.fromkeys(SLOW, "pyvista")
+NEEDS |= {"glb": "trimesh", "mask": "skimage", "mask archive": "skimage", "xdmf": "h5py"}
 
 
 def sound(name: str) -> bytes:
@@ -290,11 +294,7 @@ def misread(name: str, data: bytes, mesh: Any) -> str:
     if points is not None and points != mesh.n_vertices:
         return f"{points} points announced, {mesh.n_vertices} read"
     found = len(_elements(mesh))
-    if elements is not None and (found < elements or (found > elements and mesh_is_solid(mesh))):
+    solid = isinstance(mesh, sm.TetMesh)  # a surface may have more, its polygons being split
+    if elements is not None and (found < elements or (solid and found > elements)):
         return f"{elements} elements announced, {found} read"
     return ""
-
-
-def mesh_is_solid(mesh: Any) -> bool:
-    """Whether it is; of surfaces more faces may be read than announced, polygons being split."""
-    return isinstance(mesh, sm.TetMesh)
