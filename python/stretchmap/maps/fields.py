@@ -66,6 +66,7 @@ def carried(
 
 def _own(fields: Fields) -> Fields:
     """Without those whose names maps use themselves, and with names every archive takes."""
+    fields = {name.removeprefix("point:").removeprefix("cell:"): a for name, a in fields.items()}
     left_out = sorted(fields.keys() & OF_MAPS)
     if left_out:
         _log.info("fields of the input a map has itself are left out: %s", ", ".join(left_out))

@@ -111,6 +111,17 @@ def test_the_command_carries_groups_into_map_and_frames(tmp_path):
     np.testing.assert_array_equal(frame.cell_data["gmsh:physical"], groups[parent])
 
 
+def test_a_map_file_as_input_hands_its_fields_on(tmp_path):
+    solid = sm.TetMesh(*shapes.cubes(shapes.RING))
+    sm.write(tmp_path / "in.npz", solid, {"t": solid.V[:, 0]})
+    for source, goal in (("in.npz", "map.npz"), ("map.npz", "again.npz")):
+        arguments = ["volume", str(tmp_path / source), "-o", str(tmp_path / goal)]
+        assert main([*arguments, "-q", "--keep-best", "--max-iter", "2"]) < 2
+    found = sm.load_map(tmp_path / "again.npz")
+    assert set(found.point_fields) == {"t"}
+    np.testing.assert_array_equal(found.point_fields["t"][: solid.n_vertices], solid.V[:, 0])
+
+
 def test_fields_that_do_not_fit(coarse, tmp_path):
     with pytest.raises(ArrayError, match="point_data"):
         coarse.with_fields({"a": np.zeros(3)})
