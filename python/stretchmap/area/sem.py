@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.arrays import describe
 from ..base.progress import Progress, report
 from ..base.torus import TWO_PI
 from ..conformal.map import ConformalMap
+from ..errors import SolverError
 from ..maps.history import IterationRecord
 
 if TYPE_CHECKING:
@@ -77,6 +79,13 @@ def unfolded_turns(
         ratios = np.maximum(_core.area.turn_areas(chart, turns), 0.0) / share
         stretch = np.bincount(edge, np.repeat(np.sqrt(ratios), 3), len(weights))
         weights = np.maximum(stretch, _LEAST_WEIGHT)
+    folded = np.flatnonzero(~(_core.area.turn_areas(chart, turns) > 0.0))
+    if len(folded):
+        raise SolverError(
+            f"{describe('face', folded)} lie so far out on a long, thin limb that a flat map "
+            "shrinks them to nothing: cut the limb short or remesh it coarser",
+            folded,
+        )
     return turns
 
 

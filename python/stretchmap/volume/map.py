@@ -367,7 +367,8 @@ def _boundary_maps(
     # per cent costs triangles their shape, which the interior has to pay for.
     if boundary == "glide":
         yield first
-        yield unfolded()
+        if not first.certificate.certified:
+            yield unfolded()
         yield areas()
     else:
         yield areas()

@@ -1,0 +1,95 @@
+"""Boundary vertices that stay where the others glide, room for slivers, and second starts."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap.area.map import finished
+from stretchmap.volume import map as volume_module
+from stretchmap.volume.minimize import minimize
+from stretchmap.volume.model import GLIDING, Budget, History
+from stretchmap.volume.options import VolumeOptions
+from stretchmap.volume.problem import VolumeProblem
+from stretchmap.volume.start import started
+from stretchmap.volume.untangle import untangle_whole
+
+SOLID = sm.samples.bumpy_torus(1500)
+
+
+@pytest.fixture(scope="module")
+def problem() -> VolumeProblem:
+    start = sm.area_map(SOLID.surface, finish="none", ratio="search")
+    return started(VolumeProblem.of(SOLID, start.image, torus=start.torus), solver="auto", tol=1e-4)
+
+
+def test_held_vertices_stay_and_the_others_glide(problem):
+    held = problem.solid.boundary_vertices[:40].astype(np.intp)
+    model = dataclasses.replace(problem, held=held).model(VolumeOptions())
+    assert (model.motion(glide=True)[held] != GLIDING).all()
+    assert len(model.gliding_faces) < len(model.faces)
+    history = History(model, Budget(60.0))
+    x = untangle_whole(model, problem.x, history, glide=True).x
+    done = minimize(model, x, history, glide=True, start=10.0, goal=100.0)
+    assert (done.x[held] == problem.x[held]).all()
+    moved = np.linalg.norm(done.x - problem.x, axis=1)
+    assert (moved[problem.solid.boundary_vertices[40:]] > 0.0).all()
+
+
+def flattened(V: np.ndarray, T: np.ndarray, inner: np.ndarray) -> tuple[np.ndarray, int]:
+    """Points with one vertex moved onto a face of its star, and the tet that got flat by it."""
+    solid = sm.TetMesh(V, T)
+    for tet in np.flatnonzero(np.isin(T, inner).any(axis=1)):
+        vertex = T[tet][np.isin(T[tet], inner)][0]
+        moved = V.copy()
+        opposite = V[T[tet][T[tet] != vertex]].mean(axis=0)
+        moved[vertex] += 0.9999 * (opposite - V[vertex])
+        if sm.distortion(solid, moved).flips == 0:
+            return moved, int(tet)
+    raise AssertionError("no star allows it")
+
+
+def test_only_slivers_are_given_room(problem):
+    model = problem.model(VolumeOptions())
+    assert (model.roomy_volumes == model.local_volumes).all()
+    inner = np.setdiff1d(np.arange(len(model.V)), model.boundary)
+    V, tet = flattened(model.V, model.T, inner)
+    flat = dataclasses.replace(model, V=V)
+    given = flat.roomy_volumes / flat.local_volumes
+    assert given[tet] > 10.0 and (given > 1.0).sum() < 20
+
+
+def test_a_needle_mesh_has_no_slivers(problem):
+    model = problem.model(VolumeOptions())
+    stretched = dataclasses.replace(model, V=np.ascontiguousarray(model.V * [100.0, 1.0, 1.0]))
+    assert (stretched.roomy_volumes == stretched.local_volumes).all()
+
+
+def test_another_start_is_tried_where_one_fails(monkeypatch):
+    tried = []
+    solve = volume_module.solve
+
+    def fails_once(problem, options, **keywords):
+        tried.append(problem.x.copy())
+        found = solve(problem, options, **keywords)
+        if len(tried) == 1:
+            x = found.problem.x.copy()
+            x[np.setdiff1d(np.arange(len(x)), problem.solid.boundary_vertices)] *= -1.0
+            return dataclasses.replace(found, problem=dataclasses.replace(found.problem, x=x))
+        return found
+
+    monkeypatch.setattr(volume_module, "solve", fails_once)
+    result = sm.volume_map(SOLID)
+    assert len(tried) == 2 and (tried[0] != tried[1]).any()
+    assert result.certificate.certified and result.distortion.flips == 0
+
+
+def test_an_unfinished_area_map_can_be_finished():
+    start = sm.area_map(SOLID.surface, finish="none")
+    done = finished(start, max_iter=50, tol=0.02)
+    assert done.certificate.certified and done.converged
+    assert done.distortion.element_std < start.distortion.element_std
+    assert (done.mesh is start.mesh) and done.torus == start.torus
