@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import FileFormatError
 from .history import NAN, IterationRecord
 
-__all__ = ["read_history", "read_meta"]
+__all__ = ["read_history", "read_meta", "summary_rows"]
 
 _DEEPEST = 20  # lists and objects within each other
 # Fields of records that files of version 0.1 call otherwise.
@@ -104,3 +104,14 @@ def _check_depth(value: Any) -> None:
         if not level:
             return
     raise FileFormatError(f"meta holds lists within lists more than {_DEEPEST} deep")
+
+
+def summary_rows(report: dict[str, Any]) -> dict[str, Any]:
+    """The entries of a map's report that its summary shows, one to a row."""
+    rows = {k: v for k, v in report.items() if k not in ("seconds", "versions", "certificate")}
+    torus, certificate = rows.pop("torus"), report.get("certificate")
+    if torus is not None:
+        rows["torus"] = f"R = {torus['R']:.6g}, r = {torus['r']:.6g}"
+    if certificate is not None and not certificate["certified"]:
+        rows["certified"] = f"no: {certificate['reason']}"
+    return rows | {f"seconds, {stage}": value for stage, value in report["seconds"].items()}

@@ -23,6 +23,7 @@ from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
 from .fields import carried
 from .history import IterationRecord
+from .meta import summary_rows
 from .points import PointMap
 from .writing import all_fields, elements, save_arrays, write_map
 
@@ -232,25 +233,12 @@ class MapResult(HasSummary, Exchanged):
             Add the list of iteration records.
         """
         history = flag("history", history)
-        d = self.distortion
         out: dict[str, Any] = {
             "kind": self.title,
             "n_vertices": len(self.mesh.V),
             "n_elements": len(elements(self.mesh)),
             "element": "tet" if isinstance(self.mesh, TetMesh) else "face",
-            "flips": d.flips,
-            "ring_mean": d.ring_mean,
-            "ring_std": d.ring_std,
-            "element_error_mean": d.element_error_mean,
-            "element_std": d.element_std,
-            "element_error_std": d.element_error_std,
-            "ratio_min": d.ratio_min,
-            "ratio_max": d.ratio_max,
-            "total_distortion": d.total_distortion,
-            "angle_mean": d.angle_mean,
-            "angle_max": d.angle_max,
-            "energy": d.stretch_energy,
-            "energy_bound": d.stretch_bound,
+            **self.distortion.report(),
             "iterations": sum(1 for record in self.history if record.iteration > 0),
             "converged": self.converged,
             "stop_reason": self.stop_reason,
@@ -271,17 +259,7 @@ class MapResult(HasSummary, Exchanged):
 
     def summary(self) -> str:
         """A table of the scalars."""
-        rows = self.to_dict()
-        seconds, torus = rows.pop("seconds"), rows.pop("torus")
-        certificate = rows.pop("certificate", None)
-        rows.pop("versions")
-        if torus is not None:
-            rows["torus"] = f"R = {torus['R']:.6g}, r = {torus['r']:.6g}"
-        if certificate is not None and not certificate["certified"]:
-            rows["certified"] = f"no: {certificate['reason']}"
-        for stage, value in seconds.items():
-            rows[f"seconds, {stage}"] = value
-        return table(rows)
+        return table(summary_rows(self.to_dict()))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the map to a file.
@@ -307,7 +285,11 @@ class MapResult(HasSummary, Exchanged):
         """
         path = as_path(path)
         if path.suffix.lower() == ".npz":
-            save_arrays(path, self._arrays())
+            d = self.distortion
+            arrays = {"image": self.image, "ratios": d.ratios, "ring_ratios": d.ring_ratios}
+            arrays |= self.extra_arrays()
+            fields = {"point": self.point_fields, "cell": self.cell_fields}
+            save_arrays(path, self.mesh, self.torus, arrays, fields, self.to_dict(history=True))
         else:
             write_map(path, self.as_cells(), self.mesh, self.image, self.angles)
 
@@ -317,19 +299,3 @@ class MapResult(HasSummary, Exchanged):
         points = {"image": self.image, "ring_ratio": d.ring_ratios, **self.point_fields}
         cells = {"ratio": d.ratios, **self.cell_fields}
         return all_fields(self.mesh, self.torus, points, cells, self.extra_arrays())
-
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        arrays: dict[str, NDArray[Any]] = {
-            "V": self.mesh.V,
-            "T" if isinstance(self.mesh, TetMesh) else "F": elements(self.mesh),
-            "image": self.image,
-            "ratios": self.distortion.ratios,
-            "ring_ratios": self.distortion.ring_ratios,
-            **self.extra_arrays(),
-            **{f"point:{name}": array for name, array in self.point_fields.items()},
-            **{f"cell:{name}": array for name, array in self.cell_fields.items()},
-        }
-        if self.torus is not None:
-            arrays["torus"] = np.array([self.torus.R, self.torus.r])
-        arrays["meta"] = np.array(json.dumps(self.to_dict(history=True), allow_nan=False))
-        return arrays

@@ -8,6 +8,8 @@ no file behind.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,8 +49,22 @@ def write_map(
         io.write(path, TriMesh(image, mesh.F), cell_data={"ratio": given.cell_data["ratio"]})
 
 
-def save_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
-    """Write an ``.npz`` that appears whole or not at all."""
+def save_arrays(
+    path: Path,
+    mesh: TriMesh | TetMesh,
+    torus: Torus | None,
+    arrays: dict[str, NDArray[Any]],
+    fields: dict[str, Mapping[str, NDArray[Any]]],
+    meta: dict[str, Any],
+) -> None:
+    """Write a map file."""
+    name = "T" if isinstance(mesh, TetMesh) else "F"
+    arrays = {"V": mesh.V, name: elements(mesh), **arrays}
+    for kind, named in fields.items():
+        arrays |= {f"{kind}:{name}": array for name, array in named.items()}
+    if torus is not None:
+        arrays["torus"] = np.array([torus.R, torus.r])
+    arrays["meta"] = np.array(json.dumps(meta, allow_nan=False))
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         save_npz(file, arrays)
 

@@ -103,6 +103,16 @@ class Distortion(HasSummary):
     angles: NDArray[np.float64] = field(repr=False)
     flipped: NDArray[np.intp] = field(repr=False)
 
+    def report(self) -> dict[str, float | int | None]:
+        """What the report of a map says of it."""
+        names = (
+            "flips", "ring_mean", "ring_std", "element_error_mean", "element_std",
+            "element_error_std", "ratio_min", "ratio_max", "total_distortion", "angle_mean",
+            "angle_max",
+        )  # fmt: skip
+        energies = {"energy": self.stretch_energy, "energy_bound": self.stretch_bound}
+        return {name: getattr(self, name) for name in names} | energies
+
     def to_dict(self) -> dict[str, float | int | None]:
         """The scalars, JSON-compatible."""
         arrays = ("ratios", "ring_ratios", "angles", "flipped")
