@@ -146,8 +146,8 @@ class MapResult(HasSummary, Exchanged):
         ArrayError
             Another number of rows, or no numbers.
         """
-        refinement = getattr(self, "refinement", None)
-        points, cells = carried(self.mesh, refinement, point_data, cell_data)
+        added = getattr(self, "refinement", None)
+        points, cells = carried(self.mesh, added, point_data, cell_data)
         return dataclasses.replace(self, point_fields=points, cell_fields=cells)
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
@@ -253,8 +253,7 @@ class MapResult(HasSummary, Exchanged):
 
     def to_json(self, history: bool = False, indent: int | None = 2) -> str:
         """:meth:`to_dict` as JSON text; what is not finite becomes ``null``."""
-        if indent is not None:
-            indent = whole("indent", indent, 0, 100)
+        indent = None if indent is None else whole("indent", indent, 0, 100)
         return json.dumps(self.to_dict(history), indent=indent, allow_nan=False)
 
     def summary(self) -> str:
