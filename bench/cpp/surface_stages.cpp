@@ -118,18 +118,18 @@ void surface_stages(const SolidTorus& solid, const Settings& settings, const Rep
   const double aspect = std::sqrt(harmonic.gram(1, 1) / harmonic.gram(0, 0));
   const Vec face_area = mesh::face_areas(s.points, s.boundary.faces);
   const area::SurfaceChart chart = area::surface_chart(s.topology, forms);
-  area::SurfaceFigures figures;
+  area::SurfaceMeasures measured;
   constexpr int kSteps = 10;
   row = measure(name("area.sem"), [&] {
     area::SurfaceSem sem(chart, face_area, aspect, Points2(harmonic.potentials));
     for (int step = 0; step < kSteps; ++step) sem.step();
-    figures = sem.figures();
+    measured = sem.measures();
   });
   row.counters = {{"steps", kSteps},
-                  {"energy", figures.energy},
-                  {"flips", figures.flips},
-                  {"ring_sd", figures.ring_sd},
-                  {"face_sd", figures.face_sd}};
+                  {"energy", measured.energy},
+                  {"flips", measured.flips},
+                  {"ring_std", measured.ring_std},
+                  {"face_std", measured.face_std}};
   report(row);
 }
 

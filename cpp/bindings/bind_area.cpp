@@ -25,13 +25,13 @@ void bind_chart(py::module_& m) {
 }
 
 void bind_sem(py::module_& m) {
-  py::class_<SurfaceFigures>(m, "SurfaceFigures")
-      .def_readonly("energy", &SurfaceFigures::energy)
-      .def_readonly("flips", &SurfaceFigures::flips)
-      .def_readonly("ring_sd", &SurfaceFigures::ring_sd)
-      .def_readonly("face_sd", &SurfaceFigures::face_sd)
-      .def_readonly("face_error", &SurfaceFigures::face_error)
-      .def_readonly("angle_mean", &SurfaceFigures::angle_mean);
+  py::class_<SurfaceMeasures>(m, "SurfaceMeasures")
+      .def_readonly("energy", &SurfaceMeasures::energy)
+      .def_readonly("flips", &SurfaceMeasures::flips)
+      .def_readonly("ring_std", &SurfaceMeasures::ring_std)
+      .def_readonly("face_std", &SurfaceMeasures::face_std)
+      .def_readonly("face_error", &SurfaceMeasures::face_error)
+      .def_readonly("angle_mean", &SurfaceMeasures::angle_mean);
   py::class_<SemStep>(m, "SemStep")
       .def_readonly("step", &SemStep::step)
       .def_readonly("residual", &SemStep::residual);
@@ -39,12 +39,12 @@ void bind_sem(py::module_& m) {
       .def(py::init<SurfaceChart, const VecRef&, double, Points2>(), py::arg("chart"),
            py::arg("areas"), py::arg("aspect"), py::arg("turns"), release_gil())
       .def("step", &SurfaceSem::step, release_gil())
-      .def("figures", &SurfaceSem::figures, release_gil())
+      .def("measures", &SurfaceSem::measures, release_gil())
       .def_property_readonly("turns", &SurfaceSem::turns);
 }
 
 void bind_chart_newton(py::module_& m) {
-  py::class_<NewtonStep>(m, "GlideStep")
+  py::class_<NewtonStep>(m, "NewtonStep")
       .def_readonly("before", &NewtonStep::before)
       .def_readonly("after", &NewtonStep::after)
       .def_readonly("step", &NewtonStep::step)
@@ -59,7 +59,7 @@ void bind_chart_newton(py::module_& m) {
             return self.step({shape, area}, reach, signal_poll());
           },
           py::arg("area"), py::arg("shape"), py::arg("reach"), release_gil())
-      .def("figures", &ChartNewton::figures, release_gil())
+      .def("measures", &ChartNewton::measures, release_gil())
       .def_property_readonly("turns", &ChartNewton::turns);
 }
 
@@ -74,7 +74,7 @@ void bind_quality(py::module_& m) {
       .def_readonly("cotan", &SurfaceReference::cotan);
   py::class_<SurfaceQuality>(m, "SurfaceQuality")
       .def_readonly("energy", &SurfaceQuality::energy)
-      .def_readonly("face_sd", &SurfaceQuality::face_sd)
+      .def_readonly("face_std", &SurfaceQuality::face_std)
       .def_readonly("angle_mean", &SurfaceQuality::angle_mean)
       .def_readonly("angle_max", &SurfaceQuality::angle_max);
   m.def("phase_qualities", &phase_qualities, py::arg("reference"), py::arg("faces").noconvert(),
@@ -87,26 +87,28 @@ void bind_glide(py::module_& m) {
              return GlideProblem{chart, reference, ratio};
            }),
            py::arg("chart"), py::arg("reference"), py::arg("ratio"), release_gil());
+  py::class_<SurfaceWeights>(m, "SurfaceWeights")
+      .def(py::init([](double area, double shape, double chart, double facing, double epsilon) {
+             return SurfaceWeights{area, shape, chart, facing, epsilon};
+           }),
+           py::kw_only(), py::arg("area") = 1.0, py::arg("shape") = 0.0, py::arg("chart") = 0.0,
+           py::arg("facing") = 0.0, py::arg("epsilon") = 0.0);
   py::class_<SurfaceNewton>(m, "SurfaceNewton")
       .def(py::init<GlideProblem, Points2>(), py::arg("problem"), py::arg("angles"), release_gil())
       .def(
           "step",
-          [](SurfaceNewton& self, double area, double shape, double chart, double facing,
-             double epsilon) {
-            return self.step({area, shape, chart, facing, epsilon}, signal_poll());
+          [](SurfaceNewton& self, const SurfaceWeights& weights) {
+            return self.step(weights, signal_poll());
           },
-          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("facing"),
-          py::arg("epsilon"), release_gil())
+          py::arg("weights"), release_gil())
       .def(
           "project_rings",
-          [](SurfaceNewton& self, double area, double shape, double chart, double facing,
-             double face_sd, double face_error) {
-            return self.project_rings({area, shape, chart, facing, 0.0}, face_sd, face_error,
-                                      signal_poll());
+          [](SurfaceNewton& self, const SurfaceWeights& weights, double face_std,
+             double face_error) {
+            return self.project_rings(weights, face_std, face_error, signal_poll());
           },
-          py::arg("area"), py::arg("shape"), py::arg("chart"), py::arg("facing"),
-          py::arg("face_sd"), py::arg("face_error"), release_gil())
-      .def("figures", &SurfaceNewton::figures, release_gil())
+          py::arg("weights"), py::arg("face_std"), py::arg("face_error"), release_gil())
+      .def("measures", &SurfaceNewton::measures, release_gil())
       .def("least_facing", &SurfaceNewton::facing, release_gil())
       .def_property_readonly("angles", &SurfaceNewton::angles);
 }

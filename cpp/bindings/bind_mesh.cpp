@@ -1,8 +1,8 @@
 #include "arrays.hpp"
-#include "stretchmap/mesh/boundary_joins.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
 #include "stretchmap/mesh/fill_borders.hpp"
 #include "stretchmap/mesh/orient.hpp"
+#include "stretchmap/mesh/overconstrained.hpp"
 #include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/surface_topology.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
@@ -87,23 +87,24 @@ void bind_diagnosis(py::module_& m) {
       .def_readonly("boundary_genus", &SolidDiagnosis::boundary_genus);
 }
 
-void bind_boundary_joins(py::module_& m) {
-  py::class_<BoundaryJoins>(m, "BoundaryJoins")
-      .def(py::init(
-               [](const TetsRef& tets, Index n) { return boundary_joins(tets, n, signal_poll()); }),
+void bind_overconstrained(py::module_& m) {
+  py::class_<OverconstrainedElements>(m, "OverconstrainedElements")
+      .def(py::init([](const TetsRef& tets, Index n) {
+             return overconstrained_elements(tets, n, signal_poll());
+           }),
            py::arg("tets").noconvert(), py::arg("n_vertices"), release_gil())
-      .def_readonly("edges", &BoundaryJoins::edges)
-      .def_readonly("faces", &BoundaryJoins::faces)
-      .def_readonly("tets", &BoundaryJoins::tets);
+      .def_readonly("edges", &OverconstrainedElements::edges)
+      .def_readonly("faces", &OverconstrainedElements::faces)
+      .def_readonly("tets", &OverconstrainedElements::tets);
   py::class_<Refinement>(m, "Refinement")
       .def(py::init([](const PointsRef& points, const TetsRef& tets) {
-             return refine_boundary_joins(points, tets, signal_poll());
+             return refine_overconstrained(points, tets, signal_poll());
            }),
            py::arg("points").noconvert(), py::arg("tets").noconvert(), release_gil())
       .def_readonly("points", &Refinement::points)
       .def_readonly("tets", &Refinement::tets)
       .def_readonly("parent_tet", &Refinement::parent_tet)
-      .def_readonly("joins", &Refinement::joins);
+      .def_readonly("split", &Refinement::split);
 }
 
 void bind_fill_borders(py::module_& m) {
@@ -124,7 +125,7 @@ void bind(py::module_& m) {
   bind_topology(m);
   bind_sizes(m);
   bind_diagnosis(m);
-  bind_boundary_joins(m);
+  bind_overconstrained(m);
   bind_fill_borders(m);
 }
 

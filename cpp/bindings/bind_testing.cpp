@@ -7,12 +7,9 @@
 #include "stretchmap/forms/cotangent.hpp"
 #include "stretchmap/forms/hodge.hpp"
 #include "stretchmap/homology/linking.hpp"
-#include "stretchmap/linalg/block_ldlt.hpp"
 #include "stretchmap/linalg/block_solver.hpp"
 #include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
-#include "stretchmap/volume/boundary_barrier.hpp"
-#include "stretchmap/volume/element_energy.hpp"
 #include "stretchmap/volume/tet_laplacian.hpp"
 
 namespace stretchmap::testing {
@@ -25,13 +22,6 @@ linalg::SolveOptions solve_options(double tol, int max_iter, bool must_converge)
 void set_values(double* target, Eigen::Index size, const VecRef& values) {
   if (values.size() != size) throw Error("SolverError", "the pattern has another number of values");
   Eigen::Map<Vec>(target, size) = values;
-}
-
-template <int K>
-Vec solve_once(const SparseMatrix& matrix, const VecRef& right) {
-  linalg::BlockLdlt<K> factor(matrix);
-  factor.factorize(matrix);
-  return factor.solve(right);
 }
 
 void bind_mesh(py::module_& m) {
@@ -86,8 +76,6 @@ void bind_linalg(py::module_& m) {
           py::arg("must_converge") = true, release_gil());
   m.def("translations", &linalg::translations, py::arg("n"));
   m.def("rigid_body_modes", &linalg::rigid_body_modes, py::arg("points").noconvert());
-  m.def("block_ldlt_solve_2", &solve_once<2>, py::arg("matrix"), py::arg("right"), release_gil());
-  m.def("block_ldlt_solve_3", &solve_once<3>, py::arg("matrix"), py::arg("right"), release_gil());
 }
 
 void bind_stretch(py::module_& m) {
@@ -156,46 +144,6 @@ void bind_volume(py::module_& m) {
       py::arg("tets").noconvert(), py::arg("fixed").noconvert(), py::arg("rest"),
       py::arg("geometry").noconvert(), py::arg("c"), py::arg("x").noconvert(), py::arg("lanes") = 8,
       "L_II, -L_IB x_B and the vertex of each row, for checks.");
-  m.def(
-      "element_energy",
-      [](const Eigen::Matrix3d& J, const volume::EnergyWeights& w) {
-        volume::ElementBatch batch;
-        for (int l = 0; l < volume::kLanes; ++l) {
-          for (int k = 0; k < 9; ++k) {
-            batch.edges[k][l] = J.data()[k];
-            batch.rest[k][l] = k % 4 == 0 ? 1.0 : 0.0;
-          }
-          batch.weight[l] = 1.0;
-        }
-        volume::element_models(batch, w);
-        Eigen::Matrix3d P;
-        Eigen::Matrix<double, 9, 9> H;
-        for (int k = 0; k < 9; ++k) P.data()[k] = batch.gradient[k][0];
-        int at = 0;
-        for (int a = 0; a < 3; ++a)
-          for (int b = a; b < 3; ++b, ++at)
-            for (int i = 0; i < 3; ++i)
-              for (int j = 0; j < 3; ++j)
-                H(3 * a + i, 3 * b + j) = H(3 * b + j, 3 * a + i) = batch.block[at][3 * i + j][0];
-        return std::make_tuple(batch.energy[0], P, H);
-      },
-      py::arg("J"), py::arg("weights"), "Energy, gradient and projected Hessian of one tet.");
-  m.def(
-      "face_energy",
-      [](const PointsRef& x, const FacesRef& faces, const RowsRef& rest, double R, double r,
-         double epsilon) {
-        const volume::BoundaryBarrier barrier(
-            {std::make_shared<volume::TorusSurface>(R, r), faces, rest, Vec::Ones(faces.rows())});
-        Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
-        Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
-        barrier.model(x, 0, epsilon, gradient, hessian);
-        return std::make_tuple(barrier.value(x, 0, epsilon).energy, gradient, hessian);
-      },
-      py::arg("x").noconvert(), py::arg("faces").noconvert(), py::arg("rest").noconvert(),
-      py::arg("R"), py::arg("r"), py::arg("epsilon"),
-      "Energy, gradient and model Hessian of the first boundary triangle, for checks.");
-  m.def("tet_stretch_gradient", &volume::tet_stretch_gradient, py::arg("image").noconvert(),
-        py::arg("tets").noconvert(), py::arg("rest_volumes"), release_gil());
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 #include <optional>
 
 #include "arrays.hpp"
-#include "stretchmap/mesh/size.hpp"
 #include "stretchmap/volume/level_histogram.hpp"
 #include "stretchmap/volume/rest_shape.hpp"
 #include "stretchmap/volume/ring_projection.hpp"
@@ -42,8 +41,6 @@ void bind_stretch(py::module_& m) {
           },
           py::arg("x"), py::arg("c"), py::arg("tol") = 1e-10, py::arg("max_iter") = 1000,
           release_gil());
-  m.def("signed_tet_volumes", &mesh::tet_volumes, py::arg("x").noconvert(),
-        py::arg("tets").noconvert(), release_gil());
   m.def("tet_stretch_energy", &tet_stretch_energy, py::arg("image_volumes"),
         py::arg("rest_volumes"), release_gil());
 }

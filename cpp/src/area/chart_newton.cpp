@@ -117,13 +117,13 @@ ChartStep ChartNewton::step(const TriangleWeights& weights, double reach, const 
   return result;
 }
 
-SurfaceFigures ChartNewton::figures() const {
+SurfaceMeasures ChartNewton::measures() const {
   const Vec image = turn_areas(chart_, turns_);
-  SurfaceFigures figures;
-  figures.energy = image.array().square().cwiseQuotient(reference_.areas.array()).sum();
-  figures.flips = static_cast<Index>((image.array() <= 0.0).count());
-  ratio_figures(chart_.faces, chart_.n_vertices, reference_.areas, image, figures);
-  return figures;
+  SurfaceMeasures measured;
+  measured.energy = image.array().square().cwiseQuotient(reference_.areas.array()).sum();
+  measured.flips = static_cast<Index>((image.array() <= 0.0).count());
+  ratio_measures(chart_.faces, chart_.n_vertices, reference_.areas, image, measured);
+  return measured;
 }
 
 }  // namespace stretchmap::area

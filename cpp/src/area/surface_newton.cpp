@@ -73,52 +73,52 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
   return unfolded_step(problem_.chart, angles_ / kTwoPi, direction / kTwoPi, 0.9, 1.0);
 }
 
-bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_sd, double face_error,
+bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std, double face_error,
                                   const Poll& poll) {
   if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
-  const SurfaceFigures before = figures();
+  const SurfaceMeasures before = measures();
   const auto take = [&](RingStep kind) {
     if (poll) poll();
     const Points2 direction = without_rotation(
         rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind, poll));
     angles_ += longest_step(direction) * direction;
-    return figures();
+    return measures();
   };
-  SurfaceFigures now = before;
+  SurfaceMeasures now = before;
   try {
     for (int step = 0; step < kBestSteps; ++step) now = take(RingStep::kBest);
     RingStep kind = RingStep::kStiff;
-    for (int step = 0; step < kStiffSteps && now.ring_sd > kRingGoal; ++step) {
-      const double sd = now.ring_sd;
+    for (int step = 0; step < kStiffSteps && now.ring_std > kRingGoal; ++step) {
+      const double sd = now.ring_std;
       now = take(kind);
-      kind = now.ring_sd <= kGain * sd ? RingStep::kAgain : RingStep::kStiff;
+      kind = now.ring_std <= kGain * sd ? RingStep::kAgain : RingStep::kStiff;
     }
   } catch (const Error&) {  // singular: nothing to be had
-    now.ring_sd = std::numeric_limits<double>::infinity();
+    now.ring_std = std::numeric_limits<double>::infinity();
   }
-  if (now.flips <= before.flips && now.ring_sd <= kRingGoal &&
-      now.face_sd <= std::max(before.face_sd, face_sd) &&
+  if (now.flips <= before.flips && now.ring_std <= kRingGoal &&
+      now.face_std <= std::max(before.face_std, face_std) &&
       now.face_error <= std::max(before.face_error, face_error))
     return true;
   angles_ = start;
   return false;
 }
 
-SurfaceFigures SurfaceNewton::figures() const {
+SurfaceMeasures SurfaceNewton::measures() const {
   Vec areas = glide_areas(problem_, angles_);
   const double total = areas.sum();
   areas /= total;
-  SurfaceFigures figures;
+  SurfaceMeasures measured;
   const Vec& source = problem_.reference.areas;
-  figures.energy = (areas.array().square() / source.array()).sum();
+  measured.energy = (areas.array().square() / source.array()).sum();
   const Points image = glide_image(problem_, angles_);
   const double R = problem_.torus().R;
-  figures.flips =
+  measured.flips =
       static_cast<Index>(certificate::torus_graph(image, problem_.chart.faces, R).bad.size());
-  figures.angle_mean = surface_quality(problem_.reference, problem_.chart.faces, image).angle_mean;
-  ratio_figures(problem_.chart.faces, problem_.chart.n_vertices, source, areas, figures);
-  return figures;
+  measured.angle_mean = surface_quality(problem_.reference, problem_.chart.faces, image).angle_mean;
+  ratio_measures(problem_.chart.faces, problem_.chart.n_vertices, source, areas, measured);
+  return measured;
 }
 
 }  // namespace stretchmap::area

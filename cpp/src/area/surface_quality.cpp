@@ -76,7 +76,7 @@ SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef
   SurfaceQuality quality;
   quality.energy =
       0.25 * (reference.areas.array() * squares * (1.0 + ratio.square().inverse())).sum();
-  quality.face_sd = std::sqrt((ratio - ratio.mean()).square().mean());
+  quality.face_std = std::sqrt((ratio - ratio.mean()).square().mean());
   quality.angle_mean = (reference.areas.array() * angle).sum();
   quality.angle_max = angle.maxCoeff();
   return quality;

@@ -82,17 +82,17 @@ double SurfaceSem::line_search(const Points2& direction) const {
                     : 0.0;
 }
 
-SurfaceFigures SurfaceSem::figures() const {
+SurfaceMeasures SurfaceSem::measures() const {
   const Vec image = turn_areas(chart_, turns_);
-  SurfaceFigures figures;
-  figures.energy = image.array().square().cwiseQuotient(areas_.array()).sum();
-  figures.flips = static_cast<Index>((image.array() <= 0.0).count());
-  ratio_figures(chart_.faces, chart_.n_vertices, areas_, image, figures);
-  return figures;
+  SurfaceMeasures measured;
+  measured.energy = image.array().square().cwiseQuotient(areas_.array()).sum();
+  measured.flips = static_cast<Index>((image.array() <= 0.0).count());
+  ratio_measures(chart_.faces, chart_.n_vertices, areas_, image, measured);
+  return measured;
 }
 
-void ratio_figures(const FacesRef& faces, Index n_vertices, const VecRef& source,
-                   const VecRef& image, SurfaceFigures& figures) {
+void ratio_measures(const FacesRef& faces, Index n_vertices, const VecRef& source,
+                    const VecRef& image, SurfaceMeasures& measured) {
   const auto deviation = [](const Eigen::ArrayXd& ratio) {
     return std::sqrt((ratio - ratio.mean()).square().mean());
   };
@@ -103,9 +103,9 @@ void ratio_figures(const FacesRef& faces, Index n_vertices, const VecRef& source
       to(faces(f, k)) += image(f);
     }
   const Eigen::ArrayXd ratio = image.array() / source.array();
-  figures.ring_sd = deviation(to / from);
-  figures.face_sd = deviation(ratio);
-  figures.face_error = (ratio - 1.0).abs().maxCoeff();
+  measured.ring_std = deviation(to / from);
+  measured.face_std = deviation(ratio);
+  measured.face_error = (ratio - 1.0).abs().maxCoeff();
 }
 
 }  // namespace stretchmap::area

@@ -80,8 +80,10 @@ std::vector<double> masked_modes(const BlockMatrix& A, const RowsRef& near_nulls
 
 }  // namespace
 
-BlockSolver::BlockSolver(BlockMatrix A, const RowsRef& near_nullspace, const BlockOptions& options)
+BlockSolver::BlockSolver(BlockMatrix A, const RowsRef& modes_given, const BlockOptions& options)
     : state_(std::make_unique<State>()) {
+  const Rows standard = modes_given.cols() == 0 ? translations(A.rows()) : Rows();
+  const RowsRef near_nullspace = modes_given.cols() == 0 ? RowsRef(standard) : modes_given;
   if (options.preconditioner != "multigrid" && options.preconditioner != "jacobi")
     throw Error("OptionError", "unknown preconditioner '" + options.preconditioner +
                                    "': choose multigrid or jacobi");
@@ -102,7 +104,7 @@ BlockSolver::BlockSolver(BlockMatrix A, const RowsRef& near_nullspace, const Blo
 }
 
 BlockSolver::BlockSolver(BlockMatrix A, const BlockOptions& options)
-    : BlockSolver(A, translations(A.rows()), options) {}
+    : BlockSolver(std::move(A), Rows(), options) {}
 
 BlockSolver::~BlockSolver() = default;
 BlockSolver::BlockSolver(BlockSolver&&) noexcept = default;

@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.mesh
 import typing
-__all__: list[str] = ['ChartNewton', 'ChartStep', 'GlideProblem', 'GlideStep', 'SemStep', 'SurfaceChart', 'SurfaceFigures', 'SurfaceNewton', 'SurfaceQuality', 'SurfaceReference', 'SurfaceSem', 'angle_from_equal_area', 'phase_qualities', 'turn_areas']
+__all__: list[str] = ['ChartNewton', 'ChartStep', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfaceQuality', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'phase_qualities', 'turn_areas']
 class SurfaceChart:
     def __init__(self, topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]) -> None:
         ...
@@ -16,7 +16,7 @@ class SurfaceChart:
     @property
     def shift_v(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
         ...
-class SurfaceFigures:
+class SurfaceMeasures:
     @property
     def angle_mean(self) -> float:
         ...
@@ -27,13 +27,13 @@ class SurfaceFigures:
     def face_error(self) -> float:
         ...
     @property
-    def face_sd(self) -> float:
+    def face_std(self) -> float:
         ...
     @property
     def flips(self) -> int:
         ...
     @property
-    def ring_sd(self) -> float:
+    def ring_std(self) -> float:
         ...
 class SemStep:
     @property
@@ -45,7 +45,7 @@ class SemStep:
 class SurfaceSem:
     def __init__(self, chart: SurfaceChart, areas: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], aspect: typing.SupportsFloat | typing.SupportsIndex, turns: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None:
         ...
-    def figures(self) -> SurfaceFigures:
+    def measures(self) -> SurfaceMeasures:
         ...
     def step(self) -> SemStep:
         ...
@@ -72,9 +72,9 @@ class SurfaceQuality:
     def energy(self) -> float:
         ...
     @property
-    def face_sd(self) -> float:
+    def face_std(self) -> float:
         ...
-class GlideStep:
+class NewtonStep:
     @property
     def after(self) -> float:
         ...
@@ -87,14 +87,14 @@ class GlideStep:
     @property
     def step(self) -> float:
         ...
-class ChartStep(GlideStep):
+class ChartStep(NewtonStep):
     @property
     def within(self) -> float:
         ...
 class ChartNewton:
     def __init__(self, chart: SurfaceChart, reference: SurfaceReference, aspect: typing.SupportsFloat | typing.SupportsIndex, turns: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None:
         ...
-    def figures(self) -> SurfaceFigures:
+    def measures(self) -> SurfaceMeasures:
         ...
     def step(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, reach: typing.SupportsFloat | typing.SupportsIndex) -> ChartStep:
         ...
@@ -104,16 +104,19 @@ class ChartNewton:
 class GlideProblem:
     def __init__(self, chart: SurfaceChart, reference: SurfaceReference, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+class SurfaceWeights:
+    def __init__(self, *, area: typing.SupportsFloat | typing.SupportsIndex = 1.0, shape: typing.SupportsFloat | typing.SupportsIndex = 0.0, chart: typing.SupportsFloat | typing.SupportsIndex = 0.0, facing: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
 class SurfaceNewton:
     def __init__(self, problem: GlideProblem, angles: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None:
         ...
-    def figures(self) -> SurfaceFigures:
-        ...
     def least_facing(self) -> float:
         ...
-    def project_rings(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, chart: typing.SupportsFloat | typing.SupportsIndex, facing: typing.SupportsFloat | typing.SupportsIndex, face_sd: typing.SupportsFloat | typing.SupportsIndex, face_error: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+    def measures(self) -> SurfaceMeasures:
         ...
-    def step(self, area: typing.SupportsFloat | typing.SupportsIndex, shape: typing.SupportsFloat | typing.SupportsIndex, chart: typing.SupportsFloat | typing.SupportsIndex, facing: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> GlideStep:
+    def project_rings(self, weights: SurfaceWeights, face_std: typing.SupportsFloat | typing.SupportsIndex, face_error: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        ...
+    def step(self, weights: SurfaceWeights) -> NewtonStep:
         ...
     @property
     def angles(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:

@@ -2,7 +2,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BorderFill', 'BoundaryJoins', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
+__all__: list[str] = ['BorderFill', 'OverconstrainedElements', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
 class SurfaceTopology:
     def __init__(self, faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
@@ -132,7 +132,7 @@ class SolidDiagnosis:
     @property
     def unreferenced(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         ...
-class BoundaryJoins:
+class OverconstrainedElements:
     def __init__(self, tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
@@ -148,13 +148,13 @@ class Refinement:
     def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"]) -> None:
         ...
     @property
-    def joins(self) -> BoundaryJoins:
-        ...
-    @property
     def parent_tet(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         ...
     @property
     def points(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        ...
+    @property
+    def split(self) -> OverconstrainedElements:
         ...
     @property
     def tets(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]"]:

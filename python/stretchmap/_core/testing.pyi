@@ -5,9 +5,8 @@ import scipy.sparse
 import stretchmap._core.area
 import stretchmap._core.linalg
 import stretchmap._core.mesh
-import stretchmap._core.volume
 import typing
-__all__: list[str] = ['BlockSolver', 'best_scale', 'block_ldlt_solve_2', 'block_ldlt_solve_3', 'chart_stretch_energy', 'chart_stretch_laplacian', 'chart_stretch_product', 'element_energy', 'equal_area_from_angle', 'face_energy', 'form_vectors', 'glide_areas', 'glide_energy', 'linking_number', 'orient2d', 'orient3d', 'rigid_body_modes', 'surface_quality', 'surface_stretch_energy', 'surface_stretch_laplacian', 'tet_laplacian', 'tet_neighbors', 'tet_stretch_gradient', 'translations', 'weighted_laplacian']
+__all__: list[str] = ['BlockSolver', 'best_scale', 'chart_stretch_energy', 'chart_stretch_laplacian', 'chart_stretch_product', 'equal_area_from_angle', 'form_vectors', 'glide_areas', 'glide_energy', 'linking_number', 'orient2d', 'orient3d', 'rigid_body_modes', 'surface_quality', 'surface_stretch_energy', 'surface_stretch_laplacian', 'tet_laplacian', 'tet_neighbors', 'translations', 'weighted_laplacian']
 class BlockSolver:
     def __init__(self, row_ptr: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], col: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], near_nullspace: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], preconditioner: str = 'multigrid') -> None:
         ...
@@ -17,26 +16,14 @@ class BlockSolver:
         ...
 def best_scale(problem: stretchmap._core.area.GlideProblem, angles: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> float:
     ...
-def block_ldlt_solve_2(matrix: scipy.sparse.csr_matrix, right: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-    ...
-def block_ldlt_solve_3(matrix: scipy.sparse.csr_matrix, right: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
-    ...
 def chart_stretch_energy(chart: stretchmap._core.area.SurfaceChart, areas: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], periods: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> float:
     ...
 def chart_stretch_laplacian(chart: stretchmap._core.area.SurfaceChart, areas: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], periods: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> scipy.sparse.csr_matrix:
     ...
 def chart_stretch_product(chart: stretchmap._core.area.SurfaceChart, areas: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], periods: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], frozen: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
     ...
-def element_energy(J: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], weights: stretchmap._core.volume.EnergyWeights) -> tuple[float, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 9]"]]:
-    """
-    Energy, gradient and projected Hessian of one tet.
-    """
 def equal_area_from_angle(v: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], tube_ratio: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...
-def face_energy(x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], rest: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], R: typing.SupportsFloat | typing.SupportsIndex, r: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]]:
-    """
-    Energy, gradient and model Hessian of the first boundary triangle, for checks.
-    """
 def form_vectors(topology: stretchmap._core.mesh.SurfaceTopology, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], form: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
     ...
 def glide_areas(problem: stretchmap._core.area.GlideProblem, angles: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -62,8 +49,6 @@ def tet_laplacian(tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m,
     L_II, -L_IB x_B and the vertex of each row, for checks.
     """
 def tet_neighbors(tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
-    ...
-def tet_stretch_gradient(image: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], rest_volumes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
     ...
 def translations(n: typing.SupportsInt | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     ...

@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.linalg
 import typing
-__all__: list[str] = ['EnergyReport', 'EnergyWeights', 'GlideSurface', 'GlidingBoundary', 'NewtonOptions', 'NewtonReport', 'RingProjection', 'RingStep', 'SolidNewton', 'TorusSurface', 'VolumetricStretch', 'level_histogram', 'level_lookup', 'rest_matrices', 'rest_triangles', 'signed_tet_volumes', 'tet_stretch_energy']
+__all__: list[str] = ['EnergyReport', 'EnergyWeights', 'GlideSurface', 'GlidingBoundary', 'NewtonOptions', 'NewtonReport', 'RingProjection', 'RingStep', 'SolidNewton', 'TorusSurface', 'VolumetricStretch', 'level_histogram', 'level_lookup', 'rest_matrices', 'rest_triangles', 'tet_stretch_energy']
 class VolumetricStretch:
     def __init__(self, tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], fixed: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"], rest_volumes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], backend: str = 'auto') -> None:
         ...
@@ -119,8 +119,6 @@ def level_lookup(tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 
 def rest_matrices(V: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], max_aspect: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     ...
 def rest_triangles(V: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], scale: typing.SupportsFloat | typing.SupportsIndex, max_aspect: typing.SupportsFloat | typing.SupportsIndex = ...) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
-    ...
-def signed_tet_volumes(x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...
 def tet_stretch_energy(image_volumes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], rest_volumes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> float:
     ...

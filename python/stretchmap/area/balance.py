@@ -46,7 +46,7 @@ def balance_areas(
     weight, reach = 1.0, _REACH
     for iteration in range(1, _STEPS + 1):
         taken = newton.step(1.0, _SHAPE / weight, reach)
-        figures = newton.figures()
+        measured = newton.measures()
         history.append(
             IterationRecord(
                 stage="balance",
@@ -54,15 +54,15 @@ def balance_areas(
                 energy=taken.after,
                 step=taken.step,
                 residual=taken.decrement,
-                flips=figures.flips,
-                ring_std=figures.ring_sd,
-                element_std=figures.face_sd,
+                flips=measured.flips,
+                ring_std=measured.ring_std,
+                element_std=measured.face_std,
                 seconds=time.perf_counter() - start,
             )
         )
-        report(progress, "area", iteration, _STEPS, face_sd=figures.face_sd)
+        report(progress, "area", iteration, _STEPS, face_std=measured.face_std)
         done = taken.before - taken.after < _SETTLED * taken.before
-        if taken.step == 0.0 or (taken.within > 1.0 - 1e-9 and (figures.face_sd < _FAIR or done)):
+        if taken.step == 0.0 or (taken.within > 1.0 - 1e-9 and (measured.face_std < _FAIR or done)):
             break
         if taken.step > _LONG and taken.within > _NEARLY:
             weight = min(weight * _GROWTH, _MOST_WEIGHT)

@@ -42,8 +42,8 @@ def unfold_faces(
         if facing > 0.0:
             break
         epsilon = min(max(-_EPSILON * facing, _LEAST_EPSILON), _MOST_EPSILON)
-        taken = newton.step(1.0, _SHAPE, _CHART, _FACING, epsilon)
-        history.append(_record("untangle", iteration + 1, taken, newton.figures(), start))
+        taken = newton.step(_weights(1.0, _FACING, epsilon))
+        history.append(_record("untangle", iteration + 1, taken, newton.measures(), start))
         report(progress, "area", iteration, _UNFOLD_STEPS, flips=history[-1].flips)
         if taken.step == 0.0:
             break
@@ -72,45 +72,40 @@ def finish_areas(
     reason = "most steps done"
     for iteration in range(max_iter + 1):
         if iteration:
-            taken = newton.step(1.0, _SHAPE / weight, _CHART / weight, barrier / weight, 0.0)
+            taken = newton.step(_weights(weight, barrier))
             if taken.step >= _FULL_STEP:
                 weight = min(weight * _GROWTH, heaviest)
-        figures = newton.figures()
-        least = min(least, figures.angle_mean)
-        history.append(_record("newton", iteration, taken, figures, start))
-        report(progress, "area", iteration, max_iter, face_sd=figures.face_sd)
-        if balance == 1.0 and figures.face_sd <= _MARGIN * tol and _within(figures, tol):
+        measured = newton.measures()
+        least = min(least, measured.angle_mean)
+        history.append(_record("newton", iteration, taken, measured, start))
+        report(progress, "area", iteration, max_iter, face_std=measured.face_std)
+        if balance == 1.0 and measured.face_std <= _MARGIN * tol and _within(measured, tol):
             break
-        if taken is not None and at_rest(taken):
-            reason = "no step lowers the energy" if taken.step == 0.0 else "energy at rest"
-            break
-        if figures.face_sd <= _FAIR * tol and figures.angle_mean > shape_budget * least:
-            reason = "shape budget spent"
+        if ended := _ended(measured, tol, taken, at_rest, shape_budget * least):
+            reason = ended
             break
     if balance < 1.0:
         return history, reason == "energy at rest" and history[-1].flips == 0, reason
-    weight = min(weight, _RING_WEIGHT)
-    if rings and newton.project_rings(
-        1.0, _SHAPE / weight, _CHART / weight, barrier / weight, tol, _RATIO_GOAL * tol
-    ):
-        history.append(_record("newton", len(history), None, newton.figures(), start))
-    figures = newton.figures()
-    if figures.flips == 0 and _within(figures, tol):
+    last = _weights(min(weight, _RING_WEIGHT), barrier)
+    if rings and newton.project_rings(last, tol, _RATIO_GOAL * tol):
+        history.append(_record("newton", len(history), None, newton.measures(), start))
+    measured = newton.measures()
+    if measured.flips == 0 and _within(measured, tol):
         return history, True, "areas within tol"
-    folds = f", {figures.flips} faces do not look outward" if figures.flips else ""
+    folds = f", {measured.flips} faces do not look outward" if measured.flips else ""
     return (
         history,
         False,
-        f"{reason}{folds}, face SD {figures.face_sd:.2e}, worst {figures.face_error:.2e}, "
+        f"{reason}{folds}, face SD {measured.face_std:.2e}, worst {measured.face_error:.2e}, "
         f"tol {tol:.2e}",
     )
 
 
-def _rest() -> Callable[[_core.area.GlideStep], bool]:
+def _rest() -> Callable[[_core.area.NewtonStep], bool]:
     """Whether the last steps, told one by one, were all too short or too small to go on."""
     stalled = slow = 0
 
-    def at_rest(taken: _core.area.GlideStep) -> bool:
+    def at_rest(taken: _core.area.NewtonStep) -> bool:
         nonlocal stalled, slow
         stalled = stalled + 1 if taken.step == 0.0 else 0
         slow = slow + 1 if taken.before - taken.after < _SLOW * abs(taken.before) else 0
@@ -119,15 +114,36 @@ def _rest() -> Callable[[_core.area.GlideStep], bool]:
     return at_rest
 
 
-def _within(figures: _core.area.SurfaceFigures, tol: float) -> bool:
-    return figures.face_sd <= tol and figures.face_error <= _RATIO_GOAL * tol
+def _weights(area: float, facing: float, epsilon: float = 0.0) -> _core.area.SurfaceWeights:
+    """The weight of the areas is one, that of the rest falls as theirs is to grow."""
+    shape, chart, facing = _SHAPE / area, _CHART / area, facing / area
+    return _core.area.SurfaceWeights(shape=shape, chart=chart, facing=facing, epsilon=epsilon)
+
+
+def _ended(
+    measured: _core.area.SurfaceMeasures,
+    tol: float,
+    taken: _core.area.NewtonStep | None,
+    at_rest: Callable[[_core.area.NewtonStep], bool],
+    most_angle: float,
+) -> str:
+    """Why no further step is to be taken, empty while one is."""
+    if taken is not None and at_rest(taken):
+        return "no step lowers the energy" if taken.step == 0.0 else "energy at rest"
+    if measured.face_std <= _FAIR * tol and measured.angle_mean > most_angle:
+        return "shape budget spent"
+    return ""
+
+
+def _within(measured: _core.area.SurfaceMeasures, tol: float) -> bool:
+    return measured.face_std <= tol and measured.face_error <= _RATIO_GOAL * tol
 
 
 def _record(
     stage: str,
     iteration: int,
-    taken: _core.area.GlideStep | None,
-    figures: _core.area.SurfaceFigures,
+    taken: _core.area.NewtonStep | None,
+    measured: _core.area.SurfaceMeasures,
     start: float,
 ) -> IterationRecord:
     return IterationRecord(
@@ -136,8 +152,8 @@ def _record(
         energy=math.nan if taken is None else taken.after,
         step=math.nan if taken is None else taken.step,
         residual=math.nan if taken is None else taken.decrement,
-        flips=figures.flips,
-        ring_std=figures.ring_sd,
-        element_std=figures.face_sd,
+        flips=measured.flips,
+        ring_std=measured.ring_std,
+        element_std=measured.face_std,
         seconds=time.perf_counter() - start,
     )

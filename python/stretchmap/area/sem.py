@@ -40,22 +40,22 @@ def minimize_stretch(
     for iteration in range(max_iter + 1):
         if iteration:
             taken = sem.step()
-        figures = sem.figures()
+        measured = sem.measures()
         history.append(
             IterationRecord(
                 stage="sem",
                 iteration=iteration,
-                energy=figures.energy,
+                energy=measured.energy,
                 step=math.nan if taken is None else taken.step,
                 residual=math.nan if taken is None else taken.residual,
-                flips=figures.flips,
-                ring_std=figures.ring_sd,
-                element_std=figures.face_sd,
+                flips=measured.flips,
+                ring_std=measured.ring_std,
+                element_std=measured.face_std,
                 seconds=time.perf_counter() - start,
             )
         )
-        report(progress, "area", iteration, max_iter, energy=figures.energy, flips=figures.flips)
-        if iteration and history[-2].energy - figures.energy <= 1e-4 * figures.energy:
+        report(progress, "area", iteration, max_iter, energy=measured.energy, flips=measured.flips)
+        if iteration and history[-2].energy - measured.energy <= 1e-4 * measured.energy:
             break
     return sem.turns, history
 

@@ -12,7 +12,7 @@ import typer
 
 from ..errors import MeshError, OptionError
 from . import common
-from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet
+from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet, Threads
 from .results import conclude
 
 if TYPE_CHECKING:
@@ -65,6 +65,7 @@ def register_solids(
         bool,
         typer.Option("--keep-best", help="Write the map even if it is not certified; exit code 1."),
     ] = False,
+    threads: Threads = None,
     json: Json = None,
     orient: Orient = False,
     compact: Compact = False,
@@ -91,6 +92,7 @@ def register_solids(
             marks,
             landmark_map=landmark_map.value,
             keep_best=keep_best,
+            threads=threads,
             progress=bar,
         )
     watch.lap("compute")

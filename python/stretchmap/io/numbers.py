@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import os
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,17 +40,7 @@ def read_numbers(path: str | os.PathLike[str], widths: dict[int, str]) -> NDArra
         If it cannot be opened.
     """
     path = as_path(path)
-    try:
-        with open_to_read(path) as binary:
-            file = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
-            reader = csv.reader(file)
-            lines = [
-                (reader.line_num, [cell.strip() for cell in row])
-                for row in reader
-                if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
-            ]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FileFormatError(f"{path} is not a readable CSV file: {error}") from None
+    lines = _rows(path)
     if lines and not any(_is_number(cell) for cell in lines[0][1]):
         del lines[0]
     wanted = " or ".join(f"{width} numbers ({what})" for width, what in widths.items())
@@ -68,6 +59,20 @@ def read_numbers(path: str | os.PathLike[str], widths: dict[int, str]) -> NDArra
             if not _is_number(cell) or not math.isfinite(float(cell)):
                 raise FileFormatError(f"{path}, line {line}: {cell!r} is not a finite number")
     return np.array([row for _, row in lines], float)
+
+
+def _rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Line number and cells of each row that is neither empty nor a remark."""
+    try:
+        with open_to_read(path) as binary:
+            reader = csv.reader(io.TextIOWrapper(binary, encoding="utf-8-sig", newline=""))
+            return [
+                (reader.line_num, [cell.strip() for cell in row])
+                for row in reader
+                if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
+            ]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FileFormatError(f"{path} is not a readable CSV file: {error}") from None
 
 
 def _is_number(cell: str) -> bool:

@@ -76,5 +76,5 @@ def overconstrained_elements(solid: TetMesh) -> OverconstrainedElements:
     >>> len(overconstrained_elements(sm.samples.solid_torus(1500)))
     0
     """
-    found = _core.mesh.BoundaryJoins(solid.T, solid.n_vertices)
+    found = _core.mesh.OverconstrainedElements(solid.T, solid.n_vertices)
     return OverconstrainedElements(found.edges, found.faces, found.tets)

@@ -164,12 +164,12 @@ def refine_overconstrained(solid: TetMesh) -> Refinement:
     (0, True)
     """
     found = _core.mesh.Refinement(solid.V, solid.T)
-    joins = found.joins
-    split = len(joins.edges) + len(joins.faces)
+    split = found.split
+    n_split = len(split.edges) + len(split.faces)
     return Refinement(
-        solid=TetMesh(found.points, found.tets) if split else solid,
-        parents=read_only(joins.edges),
-        face_parents=read_only(joins.faces),
+        solid=TetMesh(found.points, found.tets) if n_split else solid,
+        parents=read_only(split.edges),
+        face_parents=read_only(split.faces),
         parent_tet=read_only(found.parent_tet),
     )
 

@@ -128,6 +128,15 @@ def cut_handles(
     return surface, tuple(cuts)
 
 
+def _without_crossings(cut: TriMesh, genus: int) -> TriMesh | None:
+    """The surface repaired, None where that cannot be done or gives another genus."""
+    try:
+        repaired = remove_crossings(TriMesh(*compacted(cut.V, cut.F)))[0]
+    except SelfIntersectionError:
+        return None
+    return repaired if repaired.genus == genus else None
+
+
 def _cut_round(
     basis: HomologyBasis, most: int, limit: float
 ) -> tuple[TriMesh, list[_Candidate]] | None:
@@ -145,14 +154,10 @@ def _cut_round(
                 break
         if crossing and done:  # the repair numbers anew: in the next round
             continue
-        if crossing:
-            try:
-                cut = remove_crossings(TriMesh(*compacted(cut.V, cut.F)))[0]
-            except SelfIntersectionError:
-                continue
-            if cut.genus != surface.genus - 1:
-                continue
-        surface = cut
+        repaired = _without_crossings(cut, surface.genus - 1) if crossing else cut
+        if repaired is None:
+            continue
+        surface = repaired
         done.append(candidate)
         if crossing or len(done) == most:
             break

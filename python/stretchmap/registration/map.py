@@ -12,7 +12,7 @@ import logging
 import os
 import time
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.arrays import read_only
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
+from ..base.threads import takes_threads
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate
 from ..errors import ArrayError, CertificationError, SolverError
@@ -39,6 +40,8 @@ from .match import affine_landmark_map, match_surfaces
 __all__ = ["Registration", "register"]
 
 _log = logging.getLogger("stretchmap")
+
+LandmarkMap = Literal["smooth", "affine"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -93,7 +96,7 @@ class Registration(MapResult):
     landmarks: Landmarks
     landmark_error: float
     gauge: Gauge
-    landmark_map: str
+    landmark_map: LandmarkMap
     refinement: Refinement | None = field(repr=False)
     boundary_splits: int
     certificate: Certificate
@@ -121,16 +124,18 @@ class Registration(MapResult):
         return {"target_V": self.target.V, "target_T": self.target.T, "landmarks": pairs}
 
 
+@takes_threads
 def register(
     source: TetMesh,
     target: TetMesh,
     landmarks: Landmarks | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
     *,
-    landmark_map: str = "smooth",
+    landmark_map: LandmarkMap = "smooth",
     max_iter: int = 300,
     tol: float = 1e-3,
     keep_best: bool = False,
     options: FillOptions | None = None,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Registration:
     """Map one solid torus onto another, every piece keeping its share of the volume.
@@ -156,7 +161,9 @@ def register(
     keep_best : bool
         Return the map even if it is not certified.
     options : FillOptions, optional
-        Knobs of the volume optimisation.
+        Knobs of the volume optimization.
+    threads : int, optional
+        Threads to use, see `threads`; the result does not depend on it.
     progress : Progress, optional
         Called once per step.
 
@@ -241,7 +248,7 @@ def _boundary_map(
     source: TetMesh,
     target: TetMesh,
     marks: Landmarks,
-    landmark_map: str,
+    landmark_map: LandmarkMap,
     max_iter: int,
     tol: float,
     progress: Progress | None,
@@ -280,7 +287,7 @@ def _fill(
     target: TetMesh,
     marks: Landmarks,
     gauge: Gauge,
-    landmark_map: str,
+    landmark_map: LandmarkMap,
     history: tuple[IterationRecord, ...],
     options: FillOptions,
     keep_best: bool,

@@ -56,7 +56,7 @@ def equalize(
     weights = _core.volume.EnergyWeights(1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0)
     linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=True)
     total = o.target_iter + o.shift_iter
-    volumes = _core.volume.signed_tet_volumes(x, model.T)
+    volumes = _core.mesh.tet_volumes(x, model.T)
     measured = marginals.measure(x)
     for iteration in range(total):
         if iteration < o.target_iter:
@@ -90,7 +90,7 @@ def gently_moved(
     """``moved``, but ``x`` at vertices of tets too far from ``volumes``; ``x`` has none."""
     stay = np.zeros(len(x), bool)
     while True:
-        ratios = _core.volume.signed_tet_volumes(moved, T) / volumes
+        ratios = _core.mesh.tet_volumes(moved, T) / volumes
         harmed = ~((ratios > 1.0 - _GENTLE) & (ratios < 1.0 / (1.0 - _GENTLE)))
         if not harmed.any():
             return moved

@@ -40,7 +40,7 @@ def make_rings_exact(
     """
     fixed = np.zeros(len(model.V), np.uint8)
     fixed[model.boundary] = 1
-    volumes = _core.volume.signed_tet_volumes(x, model.T)
+    volumes = _core.mesh.tet_volumes(x, model.T)
     target = model.rings * volumes.sum()
     before = float((volumes / volumes.sum() / model.shares).std())
     projection = _core.volume.RingProjection(model.T, fixed)

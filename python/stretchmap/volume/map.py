@@ -396,7 +396,7 @@ def _result(
 ) -> VolumeMap:
     problem, refinement = outcome.problem, outcome.problem.refinement
     assert problem.torus is not None
-    volume = float(_core.volume.signed_tet_volumes(problem.x, problem.solid.T).sum())
+    volume = float(_core.mesh.tet_volumes(problem.x, problem.solid.T).sum())
     scale = (problem.solid.volume / volume) ** (1.0 / 3.0)
     image, torus = problem.x * scale, problem.torus.scaled(scale)
     clock = time.perf_counter()

@@ -153,7 +153,7 @@ class Marginals:
 
     def _amounts(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Shares of source and image volume (k, 2)."""
-        volumes = _core.volume.signed_tet_volumes(x, self.T)
+        volumes = _core.mesh.tet_volumes(x, self.T)
         return np.column_stack([self.shares, volumes / volumes.sum()])
 
     def _histograms(

@@ -40,6 +40,27 @@ class Minimized:
     newton: _core.volume.SolidNewton
 
 
+@dataclass
+class _Sharing:
+    """At the last weight the Hessian changes little: a few steps share one, as long as it serves.
+
+    Whether to stop is for a renewed one to say.
+    """
+
+    shared: int
+    kept: int = 0
+    rest: int = 0
+
+    def update(self, alpha: float, small: bool) -> None:
+        """After a step of length ``alpha`` at the last weight."""
+        if self.kept and alpha < _SERVED:
+            self.rest = _REST
+        elif not self.kept:
+            self.rest = max(self.rest - 1, 0)
+        renew = small or self.rest or alpha < _SERVED
+        self.kept = 0 if renew else (self.kept + 1) % self.shared
+
+
 def minimize(
     model: SolidModel,
     x: NDArray[np.float64],
@@ -69,12 +90,14 @@ def minimize(
     newton = model.newton(x, glide=glide)
     if not glide:
         newton.set_targets(model.targets)
-    weight, kept, rest = start, 0, 0
+    weight, sharing = start, _Sharing(o.shared)
     for iteration in range(1, total + 1):
         if history.budget.spent:
             return Minimized(x, False, "the time limit was reached", newton)
         weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
-        linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=kept > 0)
+        linear = _core.volume.NewtonOptions(
+            tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=sharing.kept > 0
+        )
         x, step = newton.step(x, weights, linear)
         before, after = step.before.energy / weight, step.after.energy / weight
         history.add(
@@ -92,14 +115,8 @@ def minimize(
                 )
         elif goal < o.volume_weight:
             return Minimized(x, True, "goal reached", newton)  # only a start for the next stage
-        elif small and kept == 0:
+        elif small and sharing.kept == 0:
             return Minimized(x, True, "the energy stopped decreasing", newton)
         else:
-            # At the last weight the Hessian changes little: a few steps share one, as long as it
-            # serves. Whether to stop is for a renewed one to say.
-            if kept and step.alpha < _SERVED:
-                rest = _REST
-            elif not kept:
-                rest = max(rest - 1, 0)
-            kept = 0 if small or rest or step.alpha < _SERVED else (kept + 1) % o.shared
+            sharing.update(step.alpha, small)
     return Minimized(x, False, "most iterations done", newton)

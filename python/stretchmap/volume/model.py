@@ -59,7 +59,7 @@ class SolidModel:
     @cached_property
     def shares(self) -> NDArray[np.float64]:
         """Source volumes of the tets, summing to 1: (k,)."""
-        volumes = _core.volume.signed_tet_volumes(self.V, self.T)
+        volumes = _core.mesh.tet_volumes(self.V, self.T)
         shares: NDArray[np.float64] = volumes / volumes.sum()
         return shares
 
@@ -236,7 +236,7 @@ class History:
         model = self.model
         if stage != self._stage:
             self._stage, self._clock = stage, time.perf_counter()
-        volumes = _core.volume.signed_tet_volumes(x, model.T)
+        volumes = _core.mesh.tet_volumes(x, model.T)
         shares = volumes / volumes.sum()
         rings = _core.measures.ring_sums(model.T, shares, len(model.V))
         record = IterationRecord(

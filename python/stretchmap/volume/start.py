@@ -37,7 +37,7 @@ def _warmed(
     """A few regularized steps (5.6), as long as they leave fewer tets inverted."""
 
     def inverted(at: NDArray[np.float64]) -> int:
-        return int(np.count_nonzero(~(_core.volume.signed_tet_volumes(at, T) > 0.0)))
+        return int(np.count_nonzero(~(_core.mesh.tet_volumes(at, T) > 0.0)))
 
     fewest = inverted(x)
     for _ in range(_WARM_STEPS):
@@ -66,7 +66,7 @@ def started(problem: VolumeProblem, *, solver: str, tol: float) -> VolumeProblem
     fixed = np.zeros(solid.n_vertices, np.uint8)
     fixed[ids] = 1
     stretch = _core.volume.VolumetricStretch(
-        solid.T, fixed, _core.volume.signed_tet_volumes(problem.V, solid.T), solver
+        solid.T, fixed, _core.mesh.tet_volumes(problem.V, solid.T), solver
     )
     x, scale = problem.x, None
     at_boundary = boundary_scale(problem)

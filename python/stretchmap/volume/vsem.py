@@ -94,14 +94,14 @@ def minimize_volumetric_stretch(
     VsemRun
     """
     clock = time.perf_counter()
-    rest = _core.volume.signed_tet_volumes(V, T)
+    rest = _core.mesh.tet_volumes(V, T)
     shares = rest / rest.sum()
     rings = _core.measures.ring_sums(T, shares, len(V))
     stretch = _core.volume.VolumetricStretch(T, fixed, rest, solver)
     history: list[IterationRecord] = []
 
     def record(x: NDArray[np.float64], iteration: int, residual: float) -> float:
-        volumes = _core.volume.signed_tet_volumes(x, T)
+        volumes = _core.mesh.tet_volumes(x, T)
         energy = float(_core.volume.tet_stretch_energy(volumes, rest))
         image_shares = volumes / volumes.sum()
         history.append(

@@ -46,6 +46,11 @@ def test_map_functions_set_it_while_they_run():
     surface = samples.bumpy_torus(2000).surface
     sm.area_map(surface, threads=3, progress=lambda *a, **k: seen.append(_core.base.thread_count()))
     assert set(seen) == {3}
+    solid = samples.solid_torus(600)
+    sm.register(
+        solid, solid, threads=2, progress=lambda *a, **k: seen.append(_core.base.thread_count())
+    )
+    assert set(seen) == {2, 3}
 
 
 def test_other_python_threads_keep_theirs():

@@ -48,7 +48,7 @@ def test_a_vertex_without_room_is_given_company(bolt, caplog):
     with caplog.at_level(logging.INFO, "stretchmap"):
         outcome = run(source, image)
     solid, x = outcome.problem.solid, outcome.problem.x
-    assert (_core.volume.signed_tet_volumes(x, solid.T) > 0.0).all()
+    assert (_core.mesh.tet_volumes(x, solid.T) > 0.0).all()
     assert "are stuck" in caplog.text and outcome.problem.refinement.halved
     ids = source.boundary_vertices
     np.testing.assert_array_equal(solid.boundary_vertices, ids)
@@ -65,7 +65,7 @@ def test_a_solid_that_must_not_be_refined_is_given_up(bolt):
     whole = refine_overconstrained(source).solid
     outcome = run(whole, image, refine=False)
     assert outcome.problem.solid is whole and not outcome.converged
-    assert (_core.volume.signed_tet_volumes(outcome.problem.x, whole.T) <= 0.0).any()
+    assert (_core.mesh.tet_volumes(outcome.problem.x, whole.T) <= 0.0).any()
     assert "could not be untangled" in outcome.stop_reason
 
 

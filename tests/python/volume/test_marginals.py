@@ -74,7 +74,7 @@ def test_targets_ask_for_what_is_missing_and_add_up(solid, axis):
     tool = marginals(solid)
     moved = distorted(solid, axis)
     targets = tool.targets(tool.measure(moved))
-    volumes = _core.volume.signed_tet_volumes(moved, solid.T)
+    volumes = _core.mesh.tet_volumes(moved, solid.T)
     ratio = tool.shares / (volumes / volumes.sum())
     # Exact up to the width of a bin; the distortion is a function of one coordinate.
     assert np.corrcoef(targets, ratio)[0, 1] > 0.8
@@ -117,7 +117,7 @@ def test_uncorrected_fifths_of_a_vertebra(load_solid):
 def test_few_tets_do_no_harm():
     small = samples.solid_torus(400, R=3.0, r=1.0)
     moved = marginals(small).shifted(small.V)
-    assert (_core.volume.signed_tet_volumes(moved, small.T) > 0.0).all()
+    assert (_core.mesh.tet_volumes(moved, small.T) > 0.0).all()
 
 
 def test_the_histogram_counts_every_tet_at_four_points(solid):
@@ -137,9 +137,9 @@ def test_the_histogram_counts_every_tet_at_four_points(solid):
 def test_equalizing_takes_no_more_than_a_fifth_of_a_tet(solid):
     moved = solid.V + np.random.default_rng(0).normal(scale=0.01, size=solid.V.shape)
     kept = gently_moved(solid.T, solid.V, moved, solid.tet_volumes)
-    ratios = _core.volume.signed_tet_volumes(kept, solid.T) / solid.tet_volumes
+    ratios = _core.mesh.tet_volumes(kept, solid.T) / solid.tet_volumes
     assert ratios.min() > 0.8 and ratios.max() < 1.25
-    ratios = _core.volume.signed_tet_volumes(moved, solid.T) / solid.tet_volumes
+    ratios = _core.mesh.tet_volumes(moved, solid.T) / solid.tet_volumes
     assert ratios.min() < 0.8 or ratios.max() > 1.25
     went = (kept != solid.V).any(axis=1)
     assert went.any() and not went.all() and np.array_equal(kept[went], moved[went])

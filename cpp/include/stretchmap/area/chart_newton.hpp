@@ -34,7 +34,7 @@ class ChartNewton {
   // \pre reach > 1.
   ChartStep step(const TriangleWeights& weights, double reach, const Poll& poll = {});
 
-  SurfaceFigures figures() const;
+  SurfaceMeasures measures() const;
   const Points2& turns() const { return turns_; }
 
  private:

@@ -27,11 +27,11 @@ class SurfaceNewton {
   // ones; after one that gained enough the next reuses its factor.
   // \return false, and nothing is changed, if that cannot be done without a flip or raises a figure
   //         of the faces above both what it was and the limit given.
-  bool project_rings(const SurfaceWeights& weights, double face_sd, double face_error,
+  bool project_rings(const SurfaceWeights& weights, double face_std, double face_error,
                      const Poll& poll = {});
 
   // \return of the polyhedral image; flips are the faces that break the certificate's condition.
-  SurfaceFigures figures() const;
+  SurfaceMeasures measures() const;
 
   // As least_facing.
   double facing() const { return least_facing(problem_, angles_); }

@@ -24,7 +24,7 @@ SurfaceReference surface_reference(const PointsRef& points, const FacesRef& face
 struct SurfaceQuality {
   double energy = 0.0;      // mean of (s1^2 + s2^2 + s1^-2 + s2^-2) / 4 over the source's area, s
                             // the singular values of a face's map, areas scaled to total one
-  double face_sd = 0.0;     // standard deviation of the area ratios
+  double face_std = 0.0;    // standard deviation of the area ratios
   double angle_mean = 0.0;  // mean of (s1 / s2 + s2 / s1) / 2 over the source's area
   double angle_max = 0.0;
 };

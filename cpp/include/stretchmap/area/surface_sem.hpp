@@ -12,11 +12,11 @@
 
 namespace stretchmap::area {
 
-struct SurfaceFigures {
+struct SurfaceMeasures {
   double energy = 0.0;      // E_S of shares of the area, at least 1
   Index flips = 0;          // faces with no or negative area in the chart
-  double ring_sd = 0.0;     // standard deviation of the area ratios of vertex rings (6.3)
-  double face_sd = 0.0;     // and of faces
+  double ring_std = 0.0;    // standard deviation of the area ratios of vertex rings (6.3)
+  double face_std = 0.0;    // and of faces
   double face_error = 0.0;  // largest |ratio - 1| of a face
   double angle_mean = 0.0;  // as in SurfaceQuality; 0 where it is not computed
 };
@@ -36,7 +36,7 @@ class SurfaceSem {
   // \throws Error "SolverError" when the factorization breaks down.
   SemStep step();
 
-  SurfaceFigures figures() const;
+  SurfaceMeasures measures() const;
   const Points2& turns() const { return turns_; }
 
  private:
@@ -51,8 +51,8 @@ class SurfaceSem {
 };
 
 // \param source,image (m) shares of the total area, each sums to one.
-// \param figures ring_sd, face_sd and face_error are filled in.
-void ratio_figures(const FacesRef& faces, Index n_vertices, const VecRef& source,
-                   const VecRef& image, SurfaceFigures& figures);
+// \param measured ring_std, face_std and face_error are filled in.
+void ratio_measures(const FacesRef& faces, Index n_vertices, const VecRef& source,
+                    const VecRef& image, SurfaceMeasures& measured);
 
 }  // namespace stretchmap::area

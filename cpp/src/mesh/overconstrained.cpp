@@ -1,4 +1,4 @@
-#include "stretchmap/mesh/boundary_joins.hpp"
+#include "stretchmap/mesh/overconstrained.hpp"
 
 #include <algorithm>
 #include <array>
@@ -33,7 +33,7 @@ struct Split {
 };
 
 struct Plan {
-  BoundaryJoins joins;
+  OverconstrainedElements found;
   std::vector<Split> splits;  // by tet, then by added vertex
 };
 
@@ -76,7 +76,7 @@ void plan_edges(const TetsRef& tets, Index n_vertices, const Rim& rim, Plan& pla
       plan.splits.push_back({groups.order[p] / 6, vertex, {a, b, -1}, 2});
     }
   }
-  plan.joins.edges = as_rows<Edges>(edges);
+  plan.found.edges = as_rows<Edges>(edges);
 }
 
 // Added vertices are numbered from `first_vertex`.
@@ -95,7 +95,7 @@ void plan_faces(const TetsRef& tets, Index n_vertices, Index first_vertex, const
       plan.splits.push_back({groups.order[p] / 4, vertex, {f[0], f[1], f[2]}, 3});
     }
   }
-  plan.joins.faces = as_rows<Faces>(faces);
+  plan.found.faces = as_rows<Faces>(faces);
 }
 
 Plan plan_splits(const TetsRef& tets, Index n_vertices, const Poll& poll) {
@@ -109,14 +109,14 @@ Plan plan_splits(const TetsRef& tets, Index n_vertices, const Poll& poll) {
   const Rim rim(tets, n_vertices, poll);
   Plan plan;
   plan_edges(tets, n_vertices, rim, plan, poll);
-  plan_faces(tets, n_vertices, n_vertices + static_cast<Index>(plan.joins.edges.rows()), rim, plan,
+  plan_faces(tets, n_vertices, n_vertices + static_cast<Index>(plan.found.edges.rows()), rim, plan,
              poll);
   std::sort(plan.splits.begin(), plan.splits.end(), [](const Split& a, const Split& b) {
     return std::pair(a.tet, a.vertex) < std::pair(b.tet, b.vertex);
   });
   Mask touched(tets.rows(), 0);
   for (const Split& split : plan.splits) touched[split.tet] = 1;
-  plan.joins.tets = set_entries(touched);
+  plan.found.tets = set_entries(touched);
   return plan;
 }
 
@@ -143,24 +143,25 @@ void split_pieces(const Split& split, std::vector<Tet>& pieces) {
 
 }  // namespace
 
-BoundaryJoins boundary_joins(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  return plan_splits(tets, n_vertices, poll).joins;
+OverconstrainedElements overconstrained_elements(const TetsRef& tets, Index n_vertices,
+                                                 const Poll& poll) {
+  return plan_splits(tets, n_vertices, poll).found;
 }
 
-Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets, const Poll& poll) {
+Refinement refine_overconstrained(const PointsRef& points, const TetsRef& tets, const Poll& poll) {
   const Index n = static_cast<Index>(points.rows());
   Plan plan = plan_splits(tets, n, poll);
-  const Index n_edges = static_cast<Index>(plan.joins.edges.rows());
-  const Index n_faces = static_cast<Index>(plan.joins.faces.rows());
+  const Index n_edges = static_cast<Index>(plan.found.edges.rows());
+  const Index n_faces = static_cast<Index>(plan.found.faces.rows());
   Refinement result;
   result.points.resize(n + n_edges + n_faces, 3);
   result.points.topRows(n) = points;
   for (Index i = 0; i < n_edges; ++i) {
-    const auto e = plan.joins.edges.row(i);
+    const auto e = plan.found.edges.row(i);
     result.points.row(n + i) = 0.5 * (points.row(e[0]) + points.row(e[1]));
   }
   for (Index j = 0; j < n_faces; ++j) {
-    const auto f = plan.joins.faces.row(j);
+    const auto f = plan.found.faces.row(j);
     result.points.row(n + n_edges + j) =
         (points.row(f[0]) + points.row(f[1]) + points.row(f[2])) / 3;
   }
@@ -177,7 +178,7 @@ Refinement refine_boundary_joins(const PointsRef& points, const TetsRef& tets, c
   }
   result.tets = as_rows<Tets>(refined);
   result.parent_tet = as_vector(parents);
-  result.joins = std::move(plan.joins);
+  result.split = std::move(plan.found);
   return result;
 }
 
