@@ -99,7 +99,7 @@ class SolidModel:
         A sliver is turned by making it thicker. In units of its own volume, which may be a
         billionth of that, its determinant means nothing and its energy drowns that of all others.
         """
-        volumes = _core.volume.signed_tet_volumes(self.V, self.T)
+        volumes = _core.mesh.tet_volumes(self.V, self.T)
         counts = np.bincount(self.T.ravel(), minlength=len(self.V))
         means = _core.measures.ring_sums(self.T, volumes, len(self.V)) / np.maximum(counts, 1)
         room = _THICK * means[self.T].min(axis=1)
