@@ -142,7 +142,8 @@ class Population(HasSummary):
         """Names of shapes unlike the others, and by how many robust standard deviations.
 
         Judged by the distance from the mean and, of three shapes or more, by what the model of all
-        others leaves unexplained; the larger counts.
+        others leaves unexplained; the larger counts. Both by their logarithms, since distances
+        spread by factors: in a sound population, too, one is often twice as far as the next.
 
         Parameters
         ----------
@@ -159,9 +160,9 @@ class Population(HasSummary):
             The threshold is not positive.
         """
         threshold = real("threshold", threshold, above=0.0)
-        scores = modified_z_scores(self.distances)
+        scores = modified_z_scores(_logarithms(self.distances))
         if len(self.names) > 2:
-            unexplained = modified_z_scores(self.measures.generalization[-1])
+            unexplained = modified_z_scores(_logarithms(self.measures.generalization[-1]))
             scores = np.maximum(scores, unexplained)
         order = np.argsort(-scores, kind="stable")
         return {self.names[i]: float(scores[i]) for i in order if scores[i] > threshold}
@@ -250,3 +251,9 @@ class Population(HasSummary):
         }
         with atomic_path(path) as temporary, open(temporary, "wb") as file:
             save_npz(file, arrays)
+
+
+def _logarithms(distances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of distances, those of nothing as of rounding."""
+    least = 1e-12 * float(distances.max(initial=0.0)) or 1.0
+    return np.asarray(np.log(np.maximum(distances, least)))

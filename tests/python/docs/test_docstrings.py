@@ -16,7 +16,13 @@ import pytest
 import stretchmap
 
 ROOMS = ("samples", "io", "population", "plot", "plot.scene", "plot.report", "mesh.refinement")
-ROOMS += ("mesh.overconstrained", "registration.suggest", "conformal.hodge")
+ROOMS += (
+    "mesh.overconstrained",
+    "registration.suggest",
+    "conformal.hodge",
+    "plot.populations",
+    "plot.population_report",
+)
 
 
 def public() -> Iterator[tuple[str, Any]]:
