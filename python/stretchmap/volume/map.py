@@ -26,8 +26,9 @@ from ..errors import KindError, OptionError
 from ..maps.files import LoadedMap
 from ..maps.result import MapResult
 from ..mesh.given import as_solid, require_same_mesh
-from ..mesh.meshes import TetMesh
+from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.refinement import Refinement
+from .anisotropy import unstretching
 from .engine import require_certified, solve
 from .model import Budget
 from .options import VolumeOptions, weight_at
@@ -251,6 +252,8 @@ def volume_map(
     for begin, patience in zip(starts, _PATIENCE, strict=False):
         if best is not None:
             _log.info("not certified (%s): once more from another start", best.certificate.reason)
+        if start is None:  # perhaps of a surface with a stretch undone
+            begin = dataclasses.replace(begin, mesh=solid.surface)
         image, torus = _start_of(solid, begin)
         problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
         outcome = solve(
@@ -349,8 +352,12 @@ def _boundary_maps(
     """Maps of the boundary to start from, each for the case that those before lead nowhere."""
     finish: Finish = "ring" if method == "vsem" else "none"
     ratio: Ratio = "conformal" if method == "vsem" else "search"
+    surface = solid.surface
+    unstretch = unstretching(solid.V, solid.T) if boundary == "glide" else None
+    if unstretch is not None:
+        surface = TriMesh(surface.V @ unstretch, surface.F)
     first = area_map(
-        solid.surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish,
+        surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish,
         keep_best=True, progress=progress,
     )  # fmt: skip
     if method == "vsem":

@@ -15,6 +15,7 @@ from ..errors import DegenerateError, OrientationError
 from ..maps.history import IterationRecord
 from ..mesh.overconstrained import overconstrained_elements
 from ..mesh.refinement import Refinement, refine_overconstrained
+from .anisotropy import unstretching
 from .model import SolidModel
 from .options import FillOptions
 
@@ -35,7 +36,8 @@ class VolumeProblem:
     refinement : Refinement or None
         That made the solid; None: it must not be refined.
     V, x : ndarray, shape (n, 3)
-        Source and image here; inner rows of ``x`` count only if it is ``warm``.
+        Source, a stretch common to all tets undone (see `unstretching`), and image here; inner
+        rows of ``x`` count only if it is ``warm``.
     center : ndarray, shape (3,)
     length : float
         A point p here is ``p * length + center`` in the image asked for.
@@ -108,10 +110,12 @@ class VolumeProblem:
             x = image if refinement is None else refinement.prolong(image)
         else:
             x[ids] = image
+        V = (mesh.V - mesh.V.mean(axis=0)) / solid.volume ** (1.0 / 3.0)
+        unstretch = unstretching(solid.V, solid.T)
         return cls(
             solid=mesh,
             refinement=refinement,
-            V=np.ascontiguousarray((mesh.V - mesh.V.mean(axis=0)) / solid.volume ** (1.0 / 3.0)),
+            V=np.ascontiguousarray(V if unstretch is None else V @ unstretch),
             x=np.ascontiguousarray((x - center) / length),
             center=center,
             length=length,

@@ -1,0 +1,47 @@
+"""A stretch common to all tets changes no ratio of volumes, and no map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap.volume.anisotropy import unstretching
+
+SOLID = sm.samples.bumpy_torus(1500)
+
+
+def stretched(matrix: np.ndarray) -> sm.TetMesh:
+    return sm.TetMesh(SOLID.V @ matrix, SOLID.T)
+
+
+def test_an_even_mesh_is_left_alone():
+    assert unstretching(SOLID.V, SOLID.T) is None
+    assert unstretching(SOLID.V * [2.0, 1.0, 1.0], SOLID.T) is None
+
+
+@pytest.mark.parametrize("factors", [(100.0, 1.0, 1.0), (1.0, 30.0, 1.0), (40.0, 1.0, 900.0)])
+def test_a_stretch_is_found_whatever_its_direction(factors):
+    turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
+    matrix = turn @ np.diag(factors) @ turn.T
+    undone = unstretching(SOLID.V @ matrix, SOLID.T)
+    assert undone is not None and np.linalg.det(undone) == pytest.approx(1.0)
+    values = np.linalg.svd(matrix @ undone, compute_uv=False)
+    assert values[0] < 2.0 * values[2]
+
+
+@pytest.mark.parametrize("factors", [(100.0, 1.0, 1.0), (1.0, 1.0, 1000.0)])
+def test_the_map_of_a_stretched_solid_is_as_good(factors):
+    plain = sm.volume_map(SOLID).distortion
+    result = sm.volume_map(stretched(np.diag(factors)))
+    assert result.certificate.certified and result.converged
+    assert result.distortion.element_error_mean < 1.2 * plain.element_error_mean
+    surface = stretched(np.diag(factors)).surface
+    assert np.array_equal(result.boundary_map.mesh.V, surface.V)
+    assert result.distortion.source_total == pytest.approx(SOLID.volume * np.prod(factors))
+
+
+def test_a_held_boundary_keeps_the_areas_of_the_surface_as_it_is():
+    result = sm.volume_map(stretched(np.diag([20.0, 1.0, 1.0])), boundary="frozen")
+    assert result.certificate.certified
+    assert result.boundary_map.distortion.element_std < 0.2
