@@ -92,13 +92,7 @@ def finish_areas(
     measured = newton.measures()
     if measured.flips == 0 and _within(measured, tol):
         return history, True, "areas within tol"
-    folds = f", {measured.flips} faces do not look outward" if measured.flips else ""
-    return (
-        history,
-        False,
-        f"{reason}{folds}, face SD {measured.face_std:.2e}, worst {measured.face_error:.2e}, "
-        f"tol {tol:.2e}",
-    )
+    return history, False, f"{reason}{_shortfall(measured)}, tol {tol:.2e}"
 
 
 def _rest() -> Callable[[_core.area.NewtonStep], bool]:
@@ -133,6 +127,11 @@ def _ended(
     if measured.face_std <= _FAIR * tol and measured.angle_mean > most_angle:
         return "shape budget spent"
     return ""
+
+
+def _shortfall(measured: _core.area.SurfaceMeasures) -> str:
+    folds = f", {measured.flips} faces do not look outward" if measured.flips else ""
+    return f"{folds}, face SD {measured.face_std:.2e}, worst {measured.face_error:.2e}"
 
 
 def _within(measured: _core.area.SurfaceMeasures, tol: float) -> bool:

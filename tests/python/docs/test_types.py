@@ -33,6 +33,7 @@ MISTAKES = {
     '[0.2, 0.8], by="u"': '[0.2, 0.8], by="w"',
     'by=("s", "v")': 'by=("s", "z")',
     "sm.register(solid, sm.samples.bumpy_torus": "sm.register(solid, sm.samples.torus_surface",
+    'landmark_map="affine"': 'landmark_map="afine"',
     'per="tet"': 'per="cell"',
     'sm.load_map("map.npz")': 'sm.loadmap("map.npz")',
     "record.ring_std for record": "record.spread for record",

@@ -23,7 +23,7 @@ flat = sm.conformal_map(surface, weights="clamped", progress=show)
 classes = sm.homology_basis(surface, solid).torus_classes
 parts = sm.partition(result, [0.2, 0.8], by="u")
 grid = sm.partition(result, (3, [0.5, 0.5]), by=("s", "v")).part(0).n_tets
-other = sm.register(solid, sm.samples.bumpy_torus(1500))
+other = sm.register(solid, sm.samples.bumpy_torus(1500), landmark_map="affine")
 density = sm.transfer(other, np.ones(solid.n_tets), per="tet")
 loaded = sm.load_map("map.npz")
 count = loaded.mesh.n_tets if isinstance(loaded.mesh, sm.TetMesh) else loaded.mesh.n_faces
