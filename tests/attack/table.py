@@ -141,6 +141,8 @@ PARAMETERS: dict[str, Parameter] = {
     "from_trimesh.data": ("object", lambda s: s.surface.to_trimesh()),
     "faces": ("whole", _value(500)),
     "genus": ("whole", _value(1)),
+    "balance": ("share", _value(1.0)),
+    "maps": ("arrays", lambda s: {0.0: s.map, 1.0: s.map}),
     "spread": ("share", _value(1.0)),
     "vertebra_population.seed": ("seed", _value(1)),
     "max_cut": ("share", _value(0.25)),
