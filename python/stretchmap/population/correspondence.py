@@ -27,6 +27,7 @@ Along = Literal["smooth", "area"]
 
 _SMOOTHINGS = 20  # rounds in which vertices round faces that cross go to the middle of their rings
 _MOST_PAIRS = 10_000
+_FILLS, _EASINGS = 4, 3  # tries to fill a boundary, and how often it is evened out before the next
 _NEARLY = 2.0  # energy of a stiff fit over the least, of poses that are looked at further
 
 Array = NDArray[np.float64]
@@ -196,12 +197,34 @@ def _smooth(
     pose, fitted = poses[best], fits[best]
     distance = fitted.distance / template.spline.length
     goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)
-    points, moved = pose(_settled(template, goal, fitted.projected)), pose(fitted.points)
+    points, moved = _settled(template, goal, fitted.projected), pose(fitted.points)
     options = FillOptions(volume_weight=volume_weight)
     try:
-        return fill(template.solid, points, options=options), moved, distance, ""
+        for _ in range(_FILLS):
+            found = fill(template.solid, pose(points), options=options, keep_best=True)
+            if found.certificate.certified:
+                return found, moved, distance, ""
+            points = _eased(template, goal, points, found)
+        reason = found.certificate.reason
     except (MeshError, SolverError) as error:
-        return None, moved, distance, f"smooth correspondence given up: {error}"
+        reason = str(error)
+    return None, moved, distance, f"smooth correspondence given up: {reason}"
+
+
+def _eased(template: Template, goal: TriMesh, points: Array, found: FillMap) -> Array:
+    """Points of the goal, evened out beside tets that stayed inverted."""
+    solid = template.solid
+    inverted = TetMesh(found.image, found.mesh.T).tet_volumes <= 0.0
+    corners = found.mesh.T[inverted].ravel()
+    rows = solid.boundary_index[corners[corners < solid.n_vertices]]
+    beside = np.zeros(len(points))
+    beside[rows[rows >= 0]] = 1.0
+    moving = (template.ring_mean @ beside + beside) > 0.0
+    eased = np.array(points)
+    tree = _core.maps.SurfaceTree(goal.V, goal.F)
+    for _ in range(_EASINGS):
+        eased[moving] = tree.closest((template.ring_mean @ eased)[moving])[0]
+    return eased
 
 
 def _fitted(
@@ -226,7 +249,7 @@ def _settled(template: Template, goal: TriMesh, points: Array) -> Array:
     """
     F = template.solid.surface.F
     tree = _core.maps.SurfaceTree(goal.V, goal.F)
-    settled = np.ascontiguousarray(points)
+    settled = np.array(points)
     for _ in range(_SMOOTHINGS):
         crossing = _core.certificate.crossing_faces(settled, F, _MOST_PAIRS)
         if not len(crossing):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import stretchmap as sm
 from population.truth import correspondence_errors, size
 from stretchmap.population import correspond
+from stretchmap.population.correspondence import _eased
 from stretchmap.population.fitting import Anchors, Template, fit_surface
 from stretchmap.population.pose import rigid_poses
 from stretchmap.population.thin_plate import ThinPlate
@@ -74,6 +77,9 @@ def test_landmarks_draw(bones):
     at = solid.surface.V[[10, 200]]
     template = Template(solid, Anchors.of(solid.surface, at))
     moved = at + np.array([[0.03 * size(solid.V), 0.0, 0.0], [0.0, 0.0, 0.0]])
+    tree = sm._core.maps.SurfaceTree(solid.surface.V, solid.surface.F)
+    moved = tree.closest(moved)[0]  # another point of the surface
+    assert np.linalg.norm(moved - at, axis=1)[0] > 0.01 * size(solid.V)
     free, held = (
         fit_surface(template, solid.surface, solid.surface.V, marks) for marks in (None, moved)
     )
@@ -89,3 +95,18 @@ def test_a_goal_that_cannot_be_reached_smoothly_is_told():
     found = correspond(template, goal)
     assert found.certificate.certified
     assert (found.along == "smooth") == (not found.note)
+
+
+def test_only_what_is_beside_inverted_tets_is_evened_out(bones):
+    template = Template(bones.solids[0])
+    solid, surface = template.solid, template.solid.surface
+    image = solid.V.copy()
+    folded = int(solid.boundary_vertices[7])
+    image[folded] += 2.0 * (image.mean(axis=0) - image[folded])
+    found = SimpleNamespace(image=image, mesh=solid)
+    inverted = np.flatnonzero(sm.TetMesh(image, solid.T).tet_volumes <= 0.0)
+    assert 0 < len(inverted) < 60
+    moved = np.abs(_eased(template, surface, surface.V, found) - surface.V).max(axis=1) > 1e-12
+    near = np.isin(solid.boundary_vertices, solid.T[inverted])
+    ring = template.ring_mean @ near.astype(float) > 0.0
+    assert moved[near].any() and not moved[~(near | ring)].any()
