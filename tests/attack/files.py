@@ -21,7 +21,7 @@ import watch
 from formats import FORMATS, NEEDS, SLOW, misread, sound
 from mutation import mutant
 
-LIMIT = 20.0  # seconds for one file
+LIMIT = 60.0  # seconds for one file; VTK alone takes some to load
 
 
 class _Notices(logging.Handler):
