@@ -17,8 +17,6 @@ using Block = Eigen::Map<Block3>;
 // for.
 constexpr double kShare = 0.9, kWholeStep = 1.0 / kShare;
 constexpr int kHoldingPasses = 6;
-// Energy per weight, and share of its own, by which a tet's may rise; factor for steps of others.
-constexpr double kRise = 1.0, kSteep = 0.5, kCalm = 0.3;
 
 // Sum in blocks of fixed size: the result does not depend on the number of threads.
 double blocked_sum(const Vec& values) {
@@ -90,11 +88,9 @@ void SolidEnergy::set_targets(const VecRef& target) {
   }
 }
 
-// Of every tet: its share of the energy, and its determinant.
-void SolidEnergy::values(const PointsRef& x, const EnergyWeights& w, Vec& energy, Vec& det) const {
+EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
   const Index k = static_cast<Index>(tets_.rows());
-  energy.resize(k);
-  det.resize(k);
+  Vec energy(k), det(k);
   constexpr Index kRun = 512;
 #pragma omp parallel for schedule(static)
   for (Index run = 0; run < k; run += kRun)
@@ -104,12 +100,6 @@ void SolidEnergy::values(const PointsRef& x, const EnergyWeights& w, Vec& energy
           det[t] = batch.det[lane];
           energy[t] = batch.energy[lane];
         });
-}
-
-EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
-  const Index k = static_cast<Index>(tets_.rows());
-  Vec energy, det;
-  values(x, w, energy, det);
   EnergyReport report;
   report.energy = blocked_sum(energy);
   if (w.face > 0.0 && barrier_.size() > 0) {
@@ -310,26 +300,6 @@ Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
     if (!held) break;
     direction.array().colwise() *= share.array();
     for (Index row = 0; row < rows(); ++row) shortened.row(row) *= share[row_vertex_[row]];
-  }
-  return shortened;
-}
-
-Points SolidEnergy::calmed(const PointsRef& x, const PointsRef& step,
-                           const EnergyWeights& w) const {
-  Points shortened = step;
-  Vec before, after, det;
-  values(x, w, before, det);
-  for (int pass = 0; pass < kHoldingPasses; ++pass) {
-    values(move(x, shortened, 1.0), w, after, det);
-    Flags steep = Flags::Zero(x.rows());
-    for (Index t = 0; t < after.size(); ++t) {
-      const double allowed = before[t] + weights_[t] * kRise + kSteep * std::abs(before[t]);
-      if (after[t] <= allowed) continue;
-      for (int a = 0; a < 4; ++a) steep[tets_(t, a)] = 1;
-    }
-    if ((steep.array() == 0).all()) break;
-    for (Index row = 0; row < rows(); ++row)
-      if (steep[row_vertex_[row]]) shortened.row(row) *= kCalm;
   }
   return shortened;
 }

@@ -50,8 +50,7 @@ void SolidNewton::try_double_step(Points& x, const Points& start, const Points& 
 // If single tets cut the step short: the others' whole step, theirs shortened, where that is lower.
 void SolidNewton::try_held_back(Points& x, const Points& start, Points& direction,
                                 const EnergyWeights& w, NewtonReport& report) const {
-  Points shortened =
-      w.epsilon > 0.0 ? energy_.calmed(start, direction, w) : energy_.held_back(start, direction);
+  Points shortened = energy_.held_back(start, direction);
   Points trial = energy_.move(start, shortened, 1.0);
   const EnergyReport there = energy_.value(trial, w);
   if (!(there.energy < report.after.energy)) return;
@@ -159,7 +158,7 @@ bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights
     report.alpha = alpha;
     if (alpha == longest) try_double_step(x, start, direction, w, report);
   }
-  if (report.alpha < kHeldUp) try_held_back(x, start, taken, w, report);
+  if (w.epsilon <= 0.0 && report.alpha < kHeldUp) try_held_back(x, start, taken, w, report);
   if (report.alpha == 0.0) return false;
   last_step_ = report.alpha * Eigen::Map<const Vec>(taken.data(), taken.size());
   return true;

@@ -145,6 +145,14 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     history = run.history
     run.x = untangle_whole(history.model, run.x, history, glide=False).x
     stuck = _patched(run, glide=False)
+    if len(stuck):
+        before = run.problem
+        run.x = untangle_whole(history.model, run.x, history, glide=False, thorough=True).x
+        left = _patched(run, glide=False)
+        if len(left) > len(stuck):
+            run.take(before)
+        else:
+            stuck = left
     if glide:
         run.x = untangle_whole(history.model, run.x, history, glide=True).x
         stuck = _patched(run, glide=True)

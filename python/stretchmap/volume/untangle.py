@@ -119,7 +119,12 @@ def _next_epsilon(epsilon: float, worst: float) -> float:
 
 
 def untangle_whole(
-    model: SolidModel, x: NDArray[np.float64], history: History, *, glide: bool
+    model: SolidModel,
+    x: NDArray[np.float64],
+    history: History,
+    *,
+    glide: bool,
+    thorough: bool = False,
 ) -> Untangled:
     """Untangle all tets at once, until none or so few are inverted that patches serve better.
 
@@ -131,12 +136,14 @@ def untangle_whole(
         Gets a record per step, of the stage ``"untangle"``.
     glide : bool
         Whether the boundary may glide; then folded boundary faces are unfolded, too.
+    thorough : bool
+        Leave none to the patches.
     """
     o = model.options
     newton = model.newton(x, glide=glide, weights=model.roomy_weights)
     newton.set_targets(model.roomy_volumes)
     # Gliding is a matter of the whole boundary.
-    few = 0 if glide else max(_FEW, int(_FEW_SHARE * len(model.T)))
+    few = 0 if glide or thorough else max(_FEW, int(_FEW_SHARE * len(model.T)))
 
     def note(
         iteration: int, at: NDArray[np.float64], step: _core.volume.NewtonReport, epsilon: float

@@ -73,15 +73,10 @@ class SolidEnergy {
   //         handful of them does not hold up all others.
   Points held_back(const PointsRef& x, const PointsRef& step) const;
 
-  // Likewise for epsilon > 0, where none turns over for good.
-  // \return the step, shortened at the vertices of those tets whose energy would rise steeply.
-  Points calmed(const PointsRef& x, const PointsRef& step, const EnergyWeights& w) const;
-
   // \return (3 rows, 3) three translations as seen from the vertex frames.
   Rows near_nullspace(const PointsRef& x) const;
 
  private:
-  void values(const PointsRef& x, const EnergyWeights& w, Vec& energy, Vec& det) const;
   Eigen::Matrix3d frame(const PointsRef& x, Index vertex) const;
   Points in_space(const PointsRef& x, const PointsRef& step) const;  // (n, 3) of a step in frames
   Vec longest_steps(const PointsRef& x, const PointsRef& direction) const;  // of every tet
