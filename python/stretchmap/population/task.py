@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -99,13 +100,23 @@ def run_job(job: Job) -> Record:
         return done
     clock = time.perf_counter()
     try:
-        with threads(1):
+        with threads(1), _one_blas_thread():
             record = _mapped(job)
     except (StretchmapError, OSError, MemoryError) as error:
         record = failed(job, f"{type(error).__name__}: {error}")
     record |= {"key": key, "seconds": time.perf_counter() - clock}
     _write(job, record)
     return record
+
+
+def _one_blas_thread() -> AbstractContextManager[Any]:
+    """Where threadpoolctl is installed: workers of a cluster often have one, this process more."""
+    try:
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return nullcontext()
+    limits: AbstractContextManager[Any] = threadpool_limits(1, user_api="blas")
+    return limits
 
 
 def failed(job: Job, error: str) -> Record:
