@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..area.map import AreaMap, Finish, area_map, finished
-from ..area.search import Ratio
+from ..area.map import AreaMap, area_map
 from ..base.arrays import read_only
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
@@ -26,9 +25,9 @@ from ..errors import KindError, OptionError
 from ..maps.files import LoadedMap
 from ..maps.result import MapResult
 from ..mesh.given import as_solid, require_same_mesh
-from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
-from .anisotropy import unstretching
+from .boundary_starts import boundary_starts
 from .engine import require_certified, solve
 from .model import Budget
 from .options import VolumeOptions, weight_at
@@ -46,7 +45,6 @@ _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 _LARGE = 1_000_000
 # Share of the time left that untangling may take, from each start.
 _PATIENCE = (0.4, 0.5, 1.0)
-_AREA_STEPS, _AREA_TOL = 100, 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -81,7 +79,7 @@ class VolumeMap(MapResult):
     converged : bool
     stop_reason : str
     seconds : dict
-        Wall-clock time per stage.
+        Wall-clock time per stage; ``"other starts"``: of those that led nowhere.
     vertex_exact : bool
         Whether the ring volumes of all interior vertices were made exact.
 
@@ -159,7 +157,8 @@ def volume_map(
     balance : float, optional
         Certified route only: from 0, pieces keep their shape, to 1, they keep their volume
         (default). The volume term weighs ``10^(6 balance - 2)`` times the shape term; below 1 the
-        volumes between level surfaces are left as they come.
+        volumes between level surfaces are left as they come. Where all tets are stretched along an
+        axis more than three times, shape is that of the solid with this undone.
     max_iter : int, optional
         Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
     start : AreaMap, VolumeMap or LoadedMap, optional
@@ -235,51 +234,70 @@ def volume_map(
             solid.n_tets, method, solid.n_tets * _BYTES_PER_TET[method] / 2**30,
         )  # fmt: skip
     solid.require_solid_torus()
-    budget = Budget.of(options, solid.n_tets)
-    boundary = boundary or ("glide" if method == "certified" else "frozen")
-    starts: Iterator[MapResult]
-    if start is None:
-        starts = _boundary_maps(solid, method, boundary, options, progress)
-    else:
-        starts = iter([instance("start", start, MapResult, "a map of this solid")])
+    if start is not None:
+        instance("start", start, MapResult, "a map of this solid")
     if method == "vsem":
-        return _paper_map(solid, next(starts), options, c or 0.0, max_iter, progress)
+        return _paper_map(solid, start, options, c or 0.0, max_iter, progress)
     if max_iter is not None:
         options = dataclasses.replace(options, frozen_iter=max_iter, glide_iter=max_iter)
     if options.tol is not None:
         options = dataclasses.replace(options, frozen_tol=options.tol, glide_tol=options.tol)
-    best = None
-    for begin, patience in zip(starts, _PATIENCE, strict=False):
-        if best is not None:
-            _log.info("not certified (%s): once more from another start", best.certificate.reason)
-        if start is None:  # perhaps of a surface with a stretch undone
-            begin = dataclasses.replace(begin, mesh=solid.surface)
+    result = _certified_map(solid, start, options, glide=boundary != "frozen", progress=progress)
+    _warn(result)
+    if not keep_best:
+        require_certified(result.certificate, "the map")
+    return result
+
+
+def _certified_map(
+    solid: TetMesh,
+    start: MapResult | None,
+    options: VolumeOptions,
+    *,
+    glide: bool,
+    progress: Progress | None,
+) -> VolumeMap:
+    """The map from the first start that leads to a certified one, or the best there is."""
+    budget = Budget.of(options, solid.n_tets)
+    starts: Iterator[MapResult] = iter([start] if start is not None else [])
+    patience: tuple[float, ...] = (1.0,)
+    if start is None:
+        starts = boundary_starts(solid, options, glide=glide, progress=progress)
+        patience = _PATIENCE
+    best, clock, vain = None, time.perf_counter(), 0.0
+    for begin, share in zip(starts, patience, strict=False):
         image, torus = _start_of(solid, begin)
         problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
         outcome = solve(
-            problem, options, glide=boundary == "glide", budget=budget,
-            patience=1.0 if start is not None else patience, progress=progress,
-        )  # fmt: skip
-        found = _result(outcome, method, boundary, begin)
+            problem, options, glide=glide, budget=budget, patience=share, progress=progress
+        )
+        found = _result(outcome, "certified", "glide" if glide else "frozen", begin)
         if best is None or _better(found, best):
             best = found
         if best.certificate.certified or budget.spent:
             break
+        vain = time.perf_counter() - clock
+        _log.info("not certified (%s): once more from another start", best.certificate.reason)
     assert best is not None
-    _warn(best)
-    if not keep_best:
-        require_certified(best.certificate, "the map")
-    return best
+    if not vain:
+        return best
+    return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
 
 
 def _paper_map(
     solid: TetMesh,
-    start: MapResult,
+    start: MapResult | None,
     options: VolumeOptions,
     c: float,
     max_iter: int | None,
     progress: Progress | None,
 ) -> VolumeMap:
+    """Algorithm 5.1."""
+    if start is None:
+        start = area_map(
+            solid.surface, ratio=options.ratio or "conformal", phase=options.phase,
+            keep_best=True, progress=progress,
+        )  # fmt: skip
     image, torus = _start_of(solid, start)
     problem = VolumeProblem.of(solid, image, torus=torus, refine=None)
     outcome = run_vsem(problem, options, c=c, max_iter=max_iter, progress=progress)
@@ -340,46 +358,6 @@ def _balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOpti
     return dataclasses.replace(
         options, volume_weight=weight_at(balance), target_iter=0, shift_iter=0
     )
-
-
-def _boundary_maps(
-    solid: TetMesh,
-    method: str,
-    boundary: str,
-    options: VolumeOptions,
-    progress: Progress | None,
-) -> Iterator[AreaMap]:
-    """Maps of the boundary to start from, each for the case that those before lead nowhere."""
-    finish: Finish = "ring" if method == "vsem" else "none"
-    ratio: Ratio = "conformal" if method == "vsem" else "search"
-    surface = solid.surface
-    unstretch = unstretching(solid.V, solid.T) if boundary == "glide" else None
-    if unstretch is not None:
-        surface = TriMesh(surface.V @ unstretch, surface.F)
-    first = area_map(
-        surface, ratio=options.ratio or ratio, phase=options.phase, finish=finish,
-        keep_best=True, progress=progress,
-    )  # fmt: skip
-    if method == "vsem":
-        yield first
-        return
-
-    def areas() -> AreaMap:
-        return finished(first, max_iter=_AREA_STEPS, tol=_AREA_TOL, progress=progress)
-
-    def unfolded() -> AreaMap:
-        return finished(first, max_iter=0, tol=_AREA_TOL, progress=progress)
-
-    # A gliding boundary loses the exact areas again; a held one is only as good as them. Their last
-    # per cent costs triangles their shape, which the interior has to pay for.
-    if boundary == "glide":
-        yield first
-        if not first.certificate.certified:
-            yield unfolded()
-        yield areas()
-    else:
-        yield areas()
-        yield unfolded()
 
 
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
