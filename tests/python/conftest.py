@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -42,6 +42,22 @@ def _surface(name: str) -> TriMesh:
     face = np.dtype([("count", "u1"), ("ids", "<i4", 3)])
     points = np.frombuffer(body, "<f8", 3 * n).reshape(n, 3)
     return TriMesh(points, np.frombuffer(body, face, m, offset=24 * n)["ids"])
+
+
+def _entries() -> set[Path]:
+    """What lies in the checkout and where the tests were started, but for builds and caches."""
+    folders = {_ROOT, _ROOT / "tests" / "python", Path.cwd()}
+    found = (path for folder in folders for path in folder.iterdir())
+    return {path for path in found if path.name[0] != "." and path.name != "build"}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_is_left_behind() -> Iterator[None]:
+    """Tests, and what they call, write to folders of their own."""
+    before = _entries()
+    yield
+    left = sorted(map(str, _entries() - before))
+    assert not left, f"left behind by a test: {', '.join(left)}"
 
 
 @pytest.fixture(scope="session")

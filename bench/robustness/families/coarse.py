@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pytetwild
 
 from stretchmap import TetMesh
+from stretchmap.preparation.wild import run_ftetwild
 
 from . import Family, drilled, tubes
 
@@ -16,13 +16,11 @@ def coarse(rng: np.random.Generator, n_tets: float) -> TetMesh:
         surface = tubes.even_tubes(rng, min(n_tets, 8_000.0))
     else:
         surface = drilled.surface_of(drilled.drilled(rng))
-    V, T = pytetwild.tetrahedralize(
-        np.array(surface.V),
-        np.array(surface.F),
-        edge_length_fac=float(rng.uniform(0.05, 0.25)),
-        epsilon=float(rng.choice([1e-3, 3e-3])),
-        num_threads=1,
-    )
+    options = {
+        "edge_length_fac": float(rng.uniform(0.05, 0.25)),
+        "epsilon": float(rng.choice([1e-3, 3e-3])),
+    }
+    V, T = run_ftetwild(surface, options)
     solid, _ = TetMesh(V, T, orient=True).compact()
     return solid
 

@@ -7,27 +7,28 @@ and need not be clean. What comes back has a boundary of its own, which does not
 from __future__ import annotations
 
 import importlib.util
+import json
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import MeshError, MissingDependencyError, SolverError
 from ..mesh.meshes import TetMesh, TriMesh
 from .soup import labels
 
-__all__ = ["chosen_filler", "fill_within_envelope", "has_ftetwild"]
+__all__ = ["chosen_filler", "fill_within_envelope", "has_ftetwild", "run_ftetwild"]
 
 _ENVELOPE = 5e-4  # of the diagonal of the bounding box
-# In a process of its own: what it meets on the way may abort it.
 _SCRIPT = """
-import sys, numpy, pytetwild
+import json, sys, numpy, pytetwild
 data = numpy.load("surface.npz")
 V, T = pytetwild.tetrahedralize(
-    data["V"], data["F"], edge_length_abs=float(sys.argv[1]), simplify=False,
-    epsilon=float(sys.argv[2]), num_threads=1)
+    data["V"], data["F"], num_threads=1, **json.loads(sys.argv[1]))
 numpy.savez("solid.npz", V=V, T=T)
 """
 
@@ -85,10 +86,31 @@ def fill_within_envelope(surface: TriMesh, edge: float) -> TetMesh:
             "filling a surface within an envelope needs pytetwild: "
             "pip install 'stretchmap[prepare]'"
         )
+    options = {"edge_length_abs": edge, "epsilon": _ENVELOPE, "simplify": False}
+    V, T = run_ftetwild(surface, options)
+    try:
+        return _largest(TetMesh(V, T, orient=True))
+    except MeshError as error:
+        raise SolverError(f"fTetWild found no solid inside the surface ({error})") from error
+
+
+def run_ftetwild(
+    surface: TriMesh, options: dict[str, Any]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Points and tets as pytetwild makes them of a surface, on one thread.
+
+    In a process and a folder of its own: what it meets on the way may abort it, and it leaves files
+    where it runs.
+
+    Raises
+    ------
+    SolverError
+        If it gives up.
+    """
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
         run = subprocess.run(
-            [sys.executable, "-c", _SCRIPT, repr(edge), repr(_ENVELOPE)],
+            [sys.executable, "-c", _SCRIPT, json.dumps(options)],
             cwd=folder, capture_output=True, text=True, errors="replace", check=False,
         )  # fmt: skip
         out = Path(folder, "solid.npz")
@@ -96,11 +118,7 @@ def fill_within_envelope(surface: TriMesh, edge: float) -> TetMesh:
             said = run.stderr.strip().splitlines() or ["no reason given"]
             raise SolverError(f"fTetWild gives up on the surface ({said[-1]})")
         with np.load(out) as found:
-            V, T = found["V"], found["T"]
-    try:
-        return _largest(TetMesh(V, T, orient=True))
-    except MeshError as error:
-        raise SolverError(f"fTetWild found no solid inside the surface ({error})") from error
+            return found["V"], found["T"]
 
 
 def _largest(solid: TetMesh) -> TetMesh:

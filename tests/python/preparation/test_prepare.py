@@ -255,6 +255,13 @@ def test_ftetwild_fills_where_it_is_wanted_or_alone(installed, monkeypatch):
     assert sm.volume_map(done.solid).certificate.certified
 
 
+def test_ftetwild_leaves_no_files_where_it_is_called(tmp_path, monkeypatch):
+    pytest.importorskip("pytetwild")
+    monkeypatch.chdir(tmp_path)
+    sm.prepare(samples.torus_surface(40, 20), faces=800, filler="ftetwild")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("seed", [3, 4])
 def test_a_surface_that_crosses_itself_all_over_is_rebuilt(seed):
     """A torus whose points are off by more than its edges: cutting out what crosses is no help."""
