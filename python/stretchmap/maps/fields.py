@@ -23,7 +23,8 @@ Fields = dict[str, NDArray[Any]]
 # What map files hold of their own, by name.
 OF_MAPS = frozenset(
     "V F T image angles torus meta target_V target_T ratio ratios ring_ratio ring_ratios file "
-    "parent_tet landmarks forms u v s cos_u sin_u cos_v sin_v".split()
+    "parent_tet landmarks forms u v s cos_u sin_u cos_v sin_v grad_u grad_v grad_s along around "
+    "radial seam_u seam_v".split()
 )
 
 

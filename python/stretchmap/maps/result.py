@@ -13,18 +13,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import read_only
 from ..base.options import as_path, flag, whole
 from ..base.tables import HasSummary, plain_dict, table, versions
 from ..base.torus import Torus
-from ..errors import OptionError
 from ..measures.elements import Distortion, distortion
 from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
+from .carrying import CarriesPoints
 from .fields import carried
 from .history import IterationRecord
 from .meta import summary_rows
-from .points import PointMap
 from .writing import all_fields, elements, save_arrays, write_map
 
 if TYPE_CHECKING:
@@ -41,7 +39,7 @@ Kind = Literal[
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class MapResult(HasSummary, Exchanged):
+class MapResult(CarriesPoints, HasSummary, Exchanged):
     """A piecewise-affine map, given by the image of each vertex.
 
     Attributes
@@ -167,63 +165,6 @@ class MapResult(HasSummary, Exchanged):
         angles = self.angles if self.torus is None else None
         return distortion(self.mesh, self.image, torus=self.torus, angles=angles)
 
-    @cached_property
-    def point_map(self) -> PointMap:
-        """The map as a function of points, which also says what lies outside and in which tet."""
-        return PointMap(self)
-
-    def forward(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Carry points of the source solid through the map.
-
-        Parameters
-        ----------
-        points : array_like, shape (n, 3)
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            NaN for points outside the source; ``point_map.forward`` says more.
-
-        Raises
-        ------
-        KindError
-            If the map is that of a surface.
-        ArrayError
-            If ``points`` does not have that shape.
-        NonFiniteError
-            If a coordinate is NaN or infinite.
-        """
-        return self.point_map.forward(points).points
-
-    def inverse(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Carry points of the image back to the source solid; as `forward`."""
-        return self.point_map.inverse(points).points
-
-    def coordinates(self, points: ArrayLike | None = None) -> NDArray[np.float64]:
-        """Solid-torus coordinates (u, v, s) of (7.1).
-
-        Parameters
-        ----------
-        points : array_like, shape (n, 3), optional
-            Points of the source; its vertices if left out.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Angles u, v in [0, 2 pi) and the distance s from the centre circle; NaN outside.
-
-        Raises
-        ------
-        OptionError
-            If the map has no torus.
-        ArrayError, NonFiniteError
-            As `forward`.
-        """
-        if self.torus is None:
-            raise OptionError("the map has no torus, so there are no coordinates on it")
-        image = self.image if points is None else self.forward(points)
-        return read_only(np.stack(self.torus.coordinates(image), axis=-1))
-
     def to_dict(self, history: bool = False) -> dict[str, Any]:
         """Everything scalar about the map, ready for JSON.
 
@@ -269,8 +210,11 @@ class MapResult(HasSummary, Exchanged):
             ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``, ``.xdmf``: the source
             mesh; as point data ``image``, ``ring_ratio`` and, on a torus, ``u``, ``v``, ``s`` with
             ``cos_u``, ``sin_u``, ``cos_v``, ``sin_v``, which have no seam where the angles start
-            anew, and ``torus`` (R and r in every row); as cell data ``ratio`` and, of a refined
-            solid, ``parent_tet``; further the fields of the input. :func:`load_map` reads them,
+            anew, and ``torus`` (R and r in every row); as cell data ``ratio``, of a refined solid
+            ``parent_tet``, and of a solid on a torus the gradients and frames of
+            :meth:`coordinate_field` (``grad_u``, ``grad_v``, ``grad_s``, ``along``, ``around``,
+            ``radial``; zero on the core) with ``seam_u`` and ``seam_v``, 1 for tets across which
+            the angle jumps; further the fields of the input. :func:`load_map` reads them,
             too. ``.obj`` of a surface with angles: the source with (u, v) in turns as texture
             coordinates. The other formats of :func:`stretchmap.write` hold no arrays and get the
             image itself, of a solid where they can hold one and of its surface where not.

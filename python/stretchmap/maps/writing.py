@@ -22,6 +22,7 @@ from ..base.torus import TWO_PI, Torus
 from ..io.npz import save_npz
 from ..mesh.exchange import Cells
 from ..mesh.meshes import TetMesh, TriMesh
+from .frames import coordinate_field, periodic
 
 __all__ = ["all_fields", "corner_turns", "elements", "save_arrays", "write_map"]
 
@@ -86,11 +87,32 @@ def all_fields(
                 ratios[name] = array
     if torus is not None:
         u, v, s = torus.coordinates(points["image"])
-        points |= {"u": u, "v": v, "s": s, "cos_u": np.cos(u), "sin_u": np.sin(u)}
-        points |= {"cos_v": np.cos(v), "sin_v": np.sin(v)}
+        points |= {"u": u, "v": v, "s": s, **periodic(u, v)}
+        if isinstance(mesh, TetMesh):
+            ratios |= _per_tet(mesh, torus, points["image"], u, v)
         points["torus"] = np.tile([torus.R, torus.r], (len(mesh.V), 1))
     kind = "tetra" if isinstance(mesh, TetMesh) else "triangle"
     return Cells(mesh.V, kind, cells, points, ratios)
+
+
+def _per_tet(
+    mesh: TetMesh,
+    torus: Torus,
+    image: NDArray[np.float64],
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+) -> dict[str, NDArray[Any]]:
+    """Gradients and frames of the tets, and which of them a seam of u or v cuts."""
+    field = coordinate_field(mesh, image, torus)
+    names = ("grad_u", "grad_v", "grad_s", "along", "around", "radial")
+    rows = np.concatenate([field.gradients, field.frames], axis=1)
+    rows[~np.isfinite(rows)] = 0.0  # on the core; files with NaN are refused by some readers
+    fields: dict[str, NDArray[Any]] = {
+        name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(names)
+    }
+    for name, angle in (("seam_u", u), ("seam_v", v)):
+        fields[name] = (np.ptp(angle[mesh.T], axis=1) >= np.pi).astype(np.int32)
+    return fields
 
 
 def corner_turns(faces: NDArray[np.int32], angles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,12 @@ from scipy.optimize import brentq
 
 from .. import _core
 from ..base.arrays import as_reals
-from ..base.options import whole
+from ..base.options import one_of, whole
 from ..base.torus import TWO_PI
 from ..errors import MeshError, OptionError, SolverError
 from .cutting import Pieces
+
+Coordinate = Literal["s", "u", "v"]
 
 
 def shares_of(fractions: int | Sequence[float], most: int) -> NDArray[np.float64]:
@@ -38,6 +41,32 @@ def shares_of(fractions: int | Sequence[float], most: int) -> NDArray[np.float64
     if not ((shares > 0.0).all() and abs(shares.sum() - 1.0) < 1e-9):
         raise OptionError(f"fractions must be positive and sum to 1, got {shares[:5].tolist()}")
     return np.asarray(shares / shares.sum())
+
+
+def asked_shares(
+    fractions: int | Sequence[float] | Sequence[int | Sequence[float]],
+    by: Coordinate | Sequence[Coordinate],
+    most: int,
+) -> tuple[tuple[Coordinate, ...], list[NDArray[np.float64]]]:
+    """Coordinates and the shares along each, with ``most`` cells at most.
+
+    Raises
+    ------
+    OptionError
+        They do not go together, are out of range, or ask for more cells.
+    """
+    single = isinstance(by, str)
+    if not (single or isinstance(by, (tuple, list))):
+        raise OptionError("by must be 's', 'u' or 'v', or a tuple of them")
+    axes = tuple(one_of("by", axis, get_args(Coordinate)) for axis in ((by,) if single else by))
+    if not axes or len(set(axes)) != len(axes):
+        raise OptionError(f"by must name each of 's', 'u', 'v' at most once, got {by!r}")
+    wanted: Any = (fractions,) if single or isinstance(fractions, (int, np.integer)) else fractions
+    if not isinstance(wanted, (tuple, list)) or len(wanted) != len(axes):
+        raise OptionError(f"{len(axes)} coordinates need a tuple of as many fractions")
+    shares = [shares_of(entry, most) for entry in wanted]
+    whole("the number of cells", math.prod(map(len, shares)), 2, most)
+    return axes, shares
 
 
 def _shell_volume(pieces: Pieces, of: str) -> Callable[[float], float]:

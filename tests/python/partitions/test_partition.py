@@ -8,7 +8,7 @@ import pytest
 import stretchmap as sm
 from shapes import a_map
 from stretchmap import _core, samples
-from stretchmap.errors import ArrayError, OptionError
+from stretchmap.errors import ArrayError, OptionError, SolverError
 from stretchmap.partitions.parts import partition
 
 RNG = np.random.default_rng(3)
@@ -120,6 +120,14 @@ def test_every_cell_of_a_grid_has_its_volume(bumpy_map, fractions, by):
     counts = [len(f) if isinstance(f, list) else f for f in fractions]
     for i, (axis, levels) in enumerate(zip(by, parts.levels, strict=True)):
         assert levels.shape == (*counts[:i], counts[i] - (axis == "s"))
+
+
+def test_a_part_too_small_for_its_volume_to_be_exact_is_refused(bumpy_map):
+    with pytest.raises(SolverError, match="part 0") as refused:
+        partition(bumpy_map, [1e-13, 1.0 - 1e-13], "u")
+    assert 0 in refused.value.ids
+    raw = partition(bumpy_map, [1e-13, 1.0 - 1e-13], "u", correct=False)
+    assert raw.solid.tet_volumes.min() >= 0.0
 
 
 def test_uncorrected_cells_are_those_of_the_image(bumpy_map):
