@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-import io
-import re
-import struct
 import tempfile
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from announced import (
+    Counts,
+    mesh_counts,
+    msh_counts,
+    npz_counts,
+    obj_counts,
+    off_counts,
+    ply_counts,
+    stl_counts,
+    vtk_counts,
+    vtu_counts,
+)  # fmt: skip
 
 import stretchmap as sm
 from stretchmap.io import read_arrays
 from stretchmap.io.numbers import read_numbers
 from stretchmap.preparation.voxels import mask_surface, read_mask
-
-# Points and elements a file announces; None where its text does not say.
-Counts = tuple[int | None, int | None]
 
 
 @dataclass(frozen=True)
@@ -153,6 +158,12 @@ def _map_of_solid(path: Path) -> None:
     np.savez(path, V=solid.V, T=solid.T, image=2.0 * solid.V, torus=[3.0, 1.0], parent_tet=ids)
 
 
+def _map_for_viewers(path: Path) -> None:
+    archive = path.with_suffix(".npz")
+    _map_of_solid(archive)
+    sm.load_map(archive).save(path)
+
+
 def _read_map(path: Path) -> Any:
     loaded = sm.load_map(path)
     loaded.summary()
@@ -177,102 +188,47 @@ def _read_numbers(path: Path) -> Any:
     assert np.isfinite(read_numbers(path, {3: "x, y, z"})).all()
 
 
-def _after(points: bytes, elements: bytes) -> Callable[[bytes], Counts]:
-    """The whole numbers that follow two patterns for the first time."""
-
-    def announced(data: bytes) -> Counts:
-        found = [re.search(pattern + rb"(\d+)\b(?![.])", data) for pattern in (points, elements)]
-        first, second = (int(m[1]) if m and len(m[1]) < 20 else None for m in found)
-        return first, second
-
-    return announced
-
-
-def _ply_counts(data: bytes) -> Counts:
-    head = data.partition(b"end_header")[0]
-    return _after(rb"(?m)^element[ \t]+vertex[ \t]+", rb"(?m)^element[ \t]+face[ \t]+")(head)
-
-
-def _off_counts(data: bytes) -> Counts:
-    found = re.match(rb"\s*OFF\s+(\d+)\s+(\d+)\b", re.sub(rb"#.*", b"", data))
-    return (int(found[1]), int(found[2])) if found else (None, None)
-
-
-def _lines(data: bytes) -> bytes:
-    return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-
-
-def _stl_counts(data: bytes) -> Counts:
-    text = _lines(data).lstrip().lower()
-    if text[:5] == b"solid":
-        return None, len(re.findall(rb"(?m)^[ \t]*facet\b", text))
-    return None, struct.unpack("<I", data[80:84])[0] if len(data) >= 84 else None
-
-
-def _obj_counts(data: bytes) -> Counts:
-    data = _lines(data).replace(b"\\\n", b" ")
-    found = [len(re.findall(rb"(?m)^[ \t]*" + key + rb"[ \t]", data)) for key in (b"v", b"f")]
-    return found[0], found[1]
-
-
-def _npz_counts(data: bytes) -> Counts:
-    """Rows by the length of the arrays, where their header is that of the sound file."""
-    sizes = []
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        names = ("V.npy", "F.npy", "T.npy")
-        members = {name: archive.read(name) for name in archive.namelist() if name in names}
-    for name, kind, bytes_per_row in (("V", b"<f8", 24), ("F", b"<i4", 12), ("T", b"<i4", 16)):
-        member = members.get(f"{name}.npy", b"")
-        if kind in member[:40] and len(member) > 10:
-            length = len(member) - 10 - int.from_bytes(member[8:10], "little")
-            sizes.append(length // bytes_per_row)
-    return (sizes[0], sizes[1]) if len(sizes) == 2 else (None, None)
-
-
-_vtk_counts = _after(rb"(?m)^POINTS +", rb"(?m)^CELL_TYPES +")
-_vtu_counts = _after(rb"NumberOfPoints=\"", rb"NumberOfCells=\"")
-_mesh_counts = _after(rb"(?m)^Vertices\s+", rb"(?m)^Tetrahedra\s+")
-_msh_counts = _after(rb"(?m)^\$Nodes\n", rb"(?m)^\$Elements\n")
-
 FORMATS: dict[str, Format] = {
-    "obj": Format(".obj", _written(), _read_mesh, _obj_counts),
-    "obj texture": Format(".obj", _written(uv=True), _read_mesh, _obj_counts),
-    "off": Format(".off", _written(), _read_mesh, _off_counts),
-    "ply": Format(".ply", _written(data=True), _read_mesh, _ply_counts),
-    "ply text": Format(".ply", _text(_text_ply), _read_mesh, _ply_counts),
-    "ply big endian": Format(".ply", _big_endian_ply, _read_mesh, _ply_counts),
-    "stl": Format(".stl", _written(), _read_mesh, _stl_counts),
-    "stl text": Format(".stl", _text(_text_stl), _read_mesh, _stl_counts),
-    "npz": Format(".npz", _written(data=True), _read_mesh, _npz_counts),
-    "npz solid": Format(".npz", _written(data=True, solid=True), _read_mesh, _npz_counts),
-    "msh 2 text": Format(".msh", _by_meshio("gmsh22", binary=False), _read_mesh, _msh_counts),
-    "msh 2": Format(".msh", _by_meshio("gmsh22", binary=True), _read_mesh, _msh_counts),
+    "obj": Format(".obj", _written(), _read_mesh, obj_counts),
+    "obj texture": Format(".obj", _written(uv=True), _read_mesh, obj_counts),
+    "off": Format(".off", _written(), _read_mesh, off_counts),
+    "ply": Format(".ply", _written(data=True), _read_mesh, ply_counts),
+    "ply text": Format(".ply", _text(_text_ply), _read_mesh, ply_counts),
+    "ply big endian": Format(".ply", _big_endian_ply, _read_mesh, ply_counts),
+    "stl": Format(".stl", _written(), _read_mesh, stl_counts),
+    "stl text": Format(".stl", _text(_text_stl), _read_mesh, stl_counts),
+    "npz": Format(".npz", _written(data=True), _read_mesh, npz_counts),
+    "npz solid": Format(".npz", _written(data=True, solid=True), _read_mesh, npz_counts),
+    "msh 2 text": Format(".msh", _by_meshio("gmsh22", binary=False), _read_mesh, msh_counts),
+    "msh 2": Format(".msh", _by_meshio("gmsh22", binary=True), _read_mesh, msh_counts),
     "msh 4 text": Format(".msh", _by_meshio("gmsh", binary=False), _read_mesh),
     "msh 4": Format(".msh", _by_meshio("gmsh", binary=True), _read_mesh),
-    "vtk text": Format(".vtk", _by_meshio("vtk42", binary=False), _read_mesh, _vtk_counts),
-    "vtk": Format(".vtk", _by_meshio("vtk42", binary=True), _read_mesh, _vtk_counts),
-    "vtk 5": Format(".vtk", _by_meshio("vtk51", binary=True), _read_mesh, _vtk_counts),
-    "vtu": Format(".vtu", _by_meshio("vtu"), _read_mesh, _vtu_counts),
-    "vtu text": Format(".vtu", _by_meshio("vtu", binary=False), _read_mesh, _vtu_counts),
-    "mesh": Format(".mesh", _written(solid=True), _read_mesh, _mesh_counts),
+    "vtk text": Format(".vtk", _by_meshio("vtk42", binary=False), _read_mesh, vtk_counts),
+    "vtk": Format(".vtk", _by_meshio("vtk42", binary=True), _read_mesh, vtk_counts),
+    "vtk 5": Format(".vtk", _by_meshio("vtk51", binary=True), _read_mesh, vtk_counts),
+    "vtu": Format(".vtu", _by_meshio("vtu"), _read_mesh, vtu_counts),
+    "vtu text": Format(".vtu", _by_meshio("vtu", binary=False), _read_mesh, vtu_counts),
+    "mesh": Format(".mesh", _written(solid=True), _read_mesh, mesh_counts),
     "xdmf": Format(".xdmf", _written(solid=True, data=True), _read_mesh),
     "vtp": Format(".vtp", _by_pyvista, _read_mesh),
     "vtk of a surface": Format(".vtk", _by_pyvista, _read_mesh),
     "glb": Format(".glb", _by_trimesh, _read_mesh),
-    "map": Format(".npz", _map, _read_map, _npz_counts),
-    "map of a solid": Format(".npz", _map_of_solid, _read_map, _npz_counts),
+    "map": Format(".npz", _map, _read_map, npz_counts),
+    "map of a solid": Format(".npz", _map_of_solid, _read_map, npz_counts),
+    "vtu map": Format(".vtu", _map_for_viewers, _read_map, vtu_counts),
+    "vtk map": Format(".vtk", _map_for_viewers, _read_map, vtk_counts),
+    "xdmf map": Format(".xdmf", _map_for_viewers, _read_map),
     "mask": Format(".npy", _mask, _read_mask),
     "mask archive": Format(".npz", _mask, _read_mask),
     "numbers": Format(".csv", _numbers, _read_numbers),
 }
 
 
-# Each of their files takes a process that loads VTK.
-SLOW = ("vtp", "vtk of a surface")
 # Packages without which there is no sound file, or no reader.
-_BY_MESHIO = {name for name in FORMATS if name.split()[0] in ("msh", "vtk", "vtu", "mesh")}
-NEEDS = dict.fromkeys(_BY_MESHIO, "meshio") | dict.fromkeys(SLOW, "pyvista")
-NEEDS |= {"glb": "trimesh", "mask": "skimage", "mask archive": "skimage", "xdmf": "h5py"}
+_BY_MESHIO = {name for name in FORMATS if name.split()[0] in ("msh", "vtk", "vtu", "mesh", "xdmf")}
+NEEDS = dict.fromkeys(_BY_MESHIO, "meshio") | dict.fromkeys(("vtp", "vtk of a surface"), "pyvista")
+NEEDS |= {"glb": "trimesh", "mask": "skimage", "mask archive": "skimage"}
+NEEDS |= dict.fromkeys((name for name in FORMATS if name.startswith("xdmf")), "h5py")
 
 
 def sound(name: str) -> bytes:

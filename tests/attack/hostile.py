@@ -101,6 +101,7 @@ _NO_PATH = {
     "no suffix": lambda: "name",
     "empty": lambda: "",
 }
+_SOUND_FOLDERS = ("a folder that is not there", "no suffix")  # are made
 
 _FRACTIONS = {
     "one part": lambda: 1,
@@ -150,6 +151,7 @@ HOSTILE: dict[str, dict[str, Callable[[], Any]]] = {
     "object": _ANY | _NO_OBJECT | _NONE,
     "progress": _ANY | _NO_OBJECT,
     "path": _ANY | _NO_PATH | _NONE,
+    "folder": {k: v for k, v in (_ANY | _NO_PATH).items() if k not in _SOUND_FOLDERS},
     "arrays": _ANY | _NO_OBJECT | {"of nothing": lambda: {"a": None}, "no name": lambda: {1: GRID}},
     "fractions": _ANY | _FRACTIONS | _NONE,
     "pair": _ANY | _PAIR,

@@ -6,105 +6,15 @@ A parameter is looked up as ``function.parameter`` first, then by its name alone
 
 from __future__ import annotations
 
-import functools
 import inspect
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sound import Sound
 
 import stretchmap as sm
-
-
-class Sound:
-    """Meshes, maps and files, each made when it is first asked for."""
-
-    def __init__(self) -> None:
-        self.folder = Path(tempfile.mkdtemp(prefix="stretchmap-attack-"))
-
-    def path(self, name: str) -> Path:
-        return self.folder / name
-
-    @functools.cached_property
-    def solid(self) -> sm.TetMesh:
-        return sm.samples.solid_torus(400)
-
-    @functools.cached_property
-    def surface(self) -> sm.TriMesh:
-        return sm.samples.torus_surface(12, 8)
-
-    @functools.cached_property
-    def basis(self) -> Any:
-        return sm.homology_basis(self.surface)
-
-    @functools.cached_property
-    def conformal(self) -> Any:
-        return sm.conformal_map(self.surface)
-
-    @functools.cached_property
-    def area_map(self) -> Any:
-        return sm.area_map(self.surface, finish="none", phase=0.0)
-
-    @functools.cached_property
-    def boundary_map(self) -> Any:
-        return sm.area_map(self.solid.surface, finish="none", phase=0.0)
-
-    @functools.cached_property
-    def map(self) -> Any:
-        return sm.volume_map(self.solid)
-
-    @functools.cached_property
-    def registration(self) -> Any:
-        return sm.register(self.solid, self.solid, max_iter=2)
-
-    @functools.cached_property
-    def partition(self) -> Any:
-        return sm.partition(self.map, 2)
-
-    @functools.cached_property
-    def grid(self) -> Any:
-        return sm.hex_mesh(self.map, sections=12, block=1, rings=1)
-
-    @functools.cached_property
-    def morph(self) -> Any:
-        return sm.morph(self.map, 2)
-
-    @functools.cached_property
-    def comparison(self) -> Any:
-        return sm.compare(self.solid, {"one": self.map.image})
-
-    @functools.cached_property
-    def located(self) -> Any:
-        return sm.PointMap(self.map).forward(self.map.mesh.V[:5])
-
-    @functools.cached_property
-    def marks(self) -> Any:
-        ids = self.solid.boundary_vertices[:3]
-        return sm.Landmarks.of(self.solid, self.solid, ids, ids)
-
-    @functools.cached_property
-    def figure(self) -> Any:
-        return sm.plot.ratios(self.map)
-
-    @functools.cached_property
-    def mesh_file(self) -> Path:
-        sm.write(self.path("mesh.npz"), self.surface)
-        return self.path("mesh.npz")
-
-    @functools.cached_property
-    def map_file(self) -> Path:
-        self.map.save(self.path("map.npz"))
-        return self.path("map.npz")
-
-    @functools.cached_property
-    def marks_file(self) -> Path:
-        ids = self.solid.boundary_vertices[:3]
-        np.savetxt(self.path("marks.csv"), np.stack([ids, ids], axis=1), "%d", ",")
-        return self.path("marks.csv")
-
 
 Parameter = tuple[str, Callable[[Sound], Any]]
 
@@ -148,6 +58,44 @@ PARAMETERS: dict[str, Parameter] = {
     "max_cut": ("share", _value(0.25)),
     "filler": ("word", _value("auto")),
     "spacing": ("array", _value((1.0, 1.0, 1.0))),
+    # populations
+    "solids": ("object", lambda s: s.bones),
+    "population": ("object", lambda s: s.population),
+    "model": ("object", lambda s: s.population.model),
+    "fit.template": ("object?", _value(None)),
+    "template": ("object", lambda s: s.solid),
+    "fit.landmarks": ("object?", _value(None)),
+    "correspond.start": ("array?", _value(None)),
+    "folder": ("folder?", _value(None)),
+    "executor": ("object?", _value(None)),
+    "cluster": ("object", _value("dask://localhost:1")),
+    "workers": ("whole?", _value(1)),
+    "along": ("word", _value("area")),
+    "scale": ("flag", _value(True)),
+    "volume_weight": ("positive", _value(1.0)),
+    "max_rounds": ("whole", _value(1)),
+    "fit.tol": ("share", _value(1.0)),
+    "shapes": ("array", lambda s: s.population.aligned),
+    "mean": ("array?", _value(None)),
+    "generalized_procrustes.start": ("array?", _value(None)),
+    "carry_field.name": ("word", _value("1")),
+    "carry_field.values": ("array", lambda s: s.bones[1].V[:, 0]),
+    "carry_field.conserve": ("word", _value("value")),
+    "fields": ("arrays", lambda s: {str(k): s.bones[k].V[:, 0] for k in range(3)}),
+    "field_statistics.conserve": ("word", _value("value")),
+    "group": ("object?", _value(None)),
+    "against": ("real", _value(0.0)),
+    "n_samples": ("whole", _value(2)),
+    "n_modes": ("whole?", _value(1)),
+    "scores": ("array", _value([1.0])),
+    "shape": ("array", lambda s: s.population.mean.V),
+    "number": ("whole", _value(0)),
+    "deviations": ("real", _value(1.0)),
+    "threshold": ("positive", _value(3.5)),
+    "map.name": ("word", _value("1")),
+    "Population.save.path": ("path", lambda s: s.path("population.npz")),
+    "rotation": ("array", _value([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])),
+    "shift": ("array", _value([0.0, 0.0, 1.0])),
     # arrays
     "image": ("array", lambda s: s.solid.V),
     "images": ("arrays", lambda s: {"one": s.solid.V}),
@@ -270,6 +218,7 @@ _MOST_STEPS |= {"max_cg", "patience"}
 _SHARES = {"floor", "frozen_tol", "glide_tol", "marginal_tol"}  # 0: as far as it goes
 # Classes that are made by hand; others are results.
 CLASSES = {"FillOptions", "PointMap", "TetMesh", "Torus", "TriMesh", "VolumeOptions"}
+CLASSES |= {"Dask", "Processes", "Similarity"}
 METHODS: dict[str, tuple[Callable[[Sound], Any], tuple[str, ...]]] = {
     "Torus": (
         _value(sm.Torus(3.0, 1.0)),
@@ -287,6 +236,15 @@ METHODS: dict[str, tuple[Callable[[Sound], Any], tuple[str, ...]]] = {
     "HexMesh": (lambda s: s.grid, ("save",)),
     "Morph": (lambda s: s.morph, ("frame", "save")),
     "Landmarks": (_value(sm.Landmarks), ("of",)),
+    "Population": (
+        lambda s: s.population,
+        ("reconstruct", "sample", "mode", "outliers", "map", "save"),
+    ),
+    "ShapeModel": (lambda s: s.population.model, ("reconstruct", "project", "sample")),
+    "Similarity": (
+        _value(sm.population.Similarity(np.eye(3), 2.0, np.ones(3))),
+        ("__call__", "back"),
+    ),
 }
 
 
@@ -302,7 +260,7 @@ class Entry:
 def entries(sound: Sound) -> list[Entry]:
     """Every function of the public modules, and the methods that take arguments."""
     found = []
-    for module in (sm, sm.samples, sm.plot):
+    for module in (sm, sm.samples, sm.plot, sm.population):
         short = module.__name__.rpartition(".")[2]
         for name in module.__all__:
             function = getattr(module, name)

@@ -17,7 +17,18 @@ import numpy as np
 
 from ..errors import FileFormatError, OptionError
 
-__all__ = ["as_path", "callback", "flag", "instance", "memory", "one_of", "pair", "real", "whole"]
+__all__ = [
+    "as_path",
+    "callback",
+    "flag",
+    "instance",
+    "memory",
+    "one_of",
+    "pair",
+    "real",
+    "shown",
+    "whole",
+]
 
 _T = TypeVar("_T")
 
@@ -41,11 +52,11 @@ def whole(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
             raise TypeError
         number = operator.index(value)
     except Exception:  # whatever an object's own conversion raises
-        raise OptionError(f"{name} must be an integer, got {_shown(value)}") from None
+        raise OptionError(f"{name} must be an integer, got {shown(value)}") from None
     if number < low:
-        raise OptionError(f"{name} must be at least {low}, got {_shown(number)}")
+        raise OptionError(f"{name} must be at least {low}, got {shown(number)}")
     if number > high:
-        raise OptionError(f"{name} must be at most {high}, got {_shown(number)}")
+        raise OptionError(f"{name} must be at most {high}, got {shown(number)}")
     return number
 
 
@@ -72,7 +83,7 @@ def real(
         except Exception:  # whatever an object's own conversion raises
             number = math.nan
     if not math.isfinite(number):
-        raise OptionError(f"{name} must be a finite number, got {_shown(value)}")
+        raise OptionError(f"{name} must be a finite number, got {shown(value)}")
     if not (low <= number <= high and above < number < below):
         bounds = [(low, "at least"), (high, "at most"), (above, "above"), (below, "below")]
         words = [f"{word} {bound:g}" for bound, word in bounds if math.isfinite(bound)]
@@ -90,7 +101,7 @@ def one_of(name: str, value: Any, choices: Sequence[str]) -> Any:
     """
     if not isinstance(value, str) or value not in choices:
         words = " or ".join([", ".join(map(repr, choices[:-1])), repr(choices[-1])])
-        raise OptionError(f"{name} must be {words}, got {_shown(value)}")
+        raise OptionError(f"{name} must be {words}, got {shown(value)}")
     return value
 
 
@@ -103,7 +114,7 @@ def flag(name: str, value: Any) -> bool:
         It is neither, such as 1 or "no".
     """
     if not isinstance(value, (bool, np.bool_)):
-        raise OptionError(f"{name} must be True or False, got {_shown(value)}")
+        raise OptionError(f"{name} must be True or False, got {shown(value)}")
     return bool(value)
 
 
@@ -116,7 +127,7 @@ def instance(name: str, value: Any, kind: type[_T], remedy: str) -> _T:
         It is of another; ``remedy`` says where one comes from.
     """
     if not isinstance(value, kind):
-        raise OptionError(f"{name} must be a {kind.__name__} ({remedy}), got {_shown(value)}")
+        raise OptionError(f"{name} must be a {kind.__name__} ({remedy}), got {shown(value)}")
     return value
 
 
@@ -129,7 +140,7 @@ def callback(name: str, value: Any) -> None:
         It is something else.
     """
     if value is not None and not callable(value):
-        raise OptionError(f"{name} must be a function or None, got {_shown(value)}")
+        raise OptionError(f"{name} must be a function or None, got {shown(value)}")
 
 
 def pair(name: str, value: Any, low: int, high: int = 2**31 - 1) -> tuple[int, int]:
@@ -141,7 +152,7 @@ def pair(name: str, value: Any, low: int, high: int = 2**31 - 1) -> tuple[int, i
         It is no tuple or list of two, or an entry is out of range.
     """
     if not isinstance(value, (tuple, list, np.ndarray)) or len(value) != 2:
-        raise OptionError(f"{name} must be two integers, got {_shown(value)}")
+        raise OptionError(f"{name} must be two integers, got {shown(value)}")
     return whole(f"{name}[0]", value[0], low, high), whole(f"{name}[1]", value[1], low, high)
 
 
@@ -158,7 +169,7 @@ def as_path(path: Any) -> Path:
         if isinstance(text, bytes) or not text or b"\0" in os.fsencode(text):
             raise TypeError
     except Exception:  # of an object with a path of its own, whatever that raises
-        raise FileFormatError(f"a file is named by a path, got {_shown(path)}") from None
+        raise FileFormatError(f"a file is named by a path, got {shown(path)}") from None
     return Path(text)
 
 
@@ -193,7 +204,7 @@ def installed_memory() -> float:
         return 2.0**40
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     """A value in a message, whatever its size and its ``__repr__`` do."""
     if isinstance(value, int) and value.bit_length() > 256:
         return f"an integer of {value.bit_length()} bits"

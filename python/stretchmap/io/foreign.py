@@ -19,7 +19,7 @@ from .arrays import MeshArrays
 from .cells import Block, simplices
 from .npz import read_archive
 
-__all__ = ["is_for_vtk_alone", "read_pyvista", "read_trimesh"]
+__all__ = ["VTK_SCRIPT", "is_for_vtk_alone", "read_pyvista", "read_trimesh", "run_vtk"]
 
 # VTK's numbers of cell types; what is missing is named by its number.
 _VTK = {
@@ -31,7 +31,7 @@ _NOT_FOR_MESHIO = re.compile(
     rb"^DATASET[ \t]+POLYDATA\b|^[^\s#].{0,200}[ \t](?:unsigned_)?long[ \t]*\r?$", re.MULTILINE
 )
 # VTK's readers abort and write past arrays on some files: they get a process of their own.
-_SCRIPT = """
+VTK_SCRIPT = """
 import sys, numpy, pyvista
 grid = pyvista.read(sys.argv[1])
 if isinstance(grid, pyvista.MultiBlock):
@@ -68,12 +68,9 @@ def read_pyvista(path: Path) -> MeshArrays:
         )
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "grid.npz")
-        run = subprocess.run(
-            [sys.executable, "-c", _SCRIPT, str(path.resolve()), str(out)],
-            capture_output=True, text=True, errors="replace", cwd=folder, check=False,
-        )  # fmt: skip
-        said = [line for line in run.stderr.splitlines() if line.strip()]
-        if run.returncode or not out.exists() or any("ERR" in line for line in said):
+        code, stderr = run_vtk(path, out)
+        said = [line for line in stderr.splitlines() if line.strip()]
+        if code or not out.exists() or any("ERR" in line for line in said):
             raise FileFormatError(f"VTK cannot read it: {said[-1] if said else 'no reason given'}")
         with open(out, "rb") as file:
             arrays = read_archive(file)
@@ -91,6 +88,15 @@ def read_pyvista(path: Path) -> MeshArrays:
         blocks.append(Block(_VTK.get(kind, f"cells of VTK's type {kind}"), cells, data))
     point_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "p:"}
     return simplices(points, blocks, point_data)
+
+
+def run_vtk(path: Path, out: Path) -> tuple[int, str]:
+    """Have VTK read a file and write its arrays to another; exit code and what it complained of."""
+    run = subprocess.run(
+        [sys.executable, "-c", VTK_SCRIPT, str(path.resolve()), str(out)],
+        capture_output=True, text=True, errors="replace", cwd=out.parent, check=False,
+    )  # fmt: skip
+    return run.returncode, run.stderr
 
 
 def read_trimesh(path: Path) -> MeshArrays:

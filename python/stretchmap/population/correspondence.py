@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.arrays import as_reals
+from ..base.options import one_of, real
 from ..certificate.findings import Certificate
-from ..errors import MeshError, SolverError
+from ..errors import MeshError, OptionError, SolverError
 from ..maps.result import MapResult
+from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh, TriMesh
 from ..registration.map import Registration, register
 from ..volume.fill import FillMap, fill
@@ -133,6 +136,8 @@ def correspond(
         No map could be certified.
     LandmarkError
         Landmarks contradict each other.
+    ArrayError, NonFiniteError, OptionError
+        An array of another shape, or an option out of range.
 
     Examples
     --------
@@ -143,7 +148,21 @@ def correspond(
     0
     """
     clock = time.perf_counter()
-    given = template if isinstance(template, Template) else Template(template)
+    given = template if isinstance(template, Template) else Template(as_solid(template, "template"))
+    solid = as_solid(solid)
+    for mesh in (given.solid, solid):
+        mesh.require_solid_torus()
+    if start is not None:
+        start = as_reals(start, "start", given.solid.surface.V.shape)
+    if landmarks is not None:
+        if given.anchors is None:
+            raise OptionError(
+                "landmarks: the template has none; pass Template(solid, Anchors.of(solid.surface, "
+                "points)) of stretchmap.population.fitting"
+            )
+        landmarks = as_reals(landmarks, "landmarks", (len(given.anchors.faces), 3))
+    one_of("along", along, ("smooth", "area"))
+    volume_weight = real("volume_weight", volume_weight, above=0.0)
     found: Registration | FillMap | None = None
     note, distance, moved = "", float("nan"), None
     if along == "smooth":

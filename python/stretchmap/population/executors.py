@@ -14,12 +14,13 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
-from ..base.options import whole
+from ..base.options import shown, whole
 from ..errors import MissingDependencyError, OptionError, StretchmapError
 
 __all__ = ["Dask", "Executor", "Processes", "Serial", "WorkerLost", "as_executor"]
 
 _ATTEMPTS = 3  # of a job whose worker dies
+_SCHEME = "dask://"
 
 Task = Callable[[Any], Any]
 
@@ -142,6 +143,8 @@ class Dask:
     ------
     MissingDependencyError
         ``distributed`` is not installed.
+    OptionError
+        It is neither.
 
     Examples
     --------
@@ -156,9 +159,13 @@ class Dask:
             raise MissingDependencyError(
                 "a Dask cluster needs distributed: pip install 'stretchmap[cluster]'"
             )
-        self.client = None if isinstance(cluster, str) else cluster
         address = cluster if isinstance(cluster, str) else ""
-        self.address = address.replace("dask://", "tcp://", 1)
+        if not address.startswith(_SCHEME) and not _is_client(cluster):
+            raise OptionError(
+                f"cluster must be 'dask://host:port' or a Dask client, got {shown(cluster)}"
+            )
+        self.client = None if address else cluster
+        self.address = address.replace(_SCHEME, "tcp://", 1)
 
     def run(self, task: Task, jobs: Sequence[Any]) -> Iterator[tuple[int, Any]]:
         """As `Executor.run`.
@@ -194,20 +201,26 @@ def as_executor(executor: Any) -> Executor:
     MissingDependencyError
         It needs a package that is not installed.
     """
-    if executor is None or executor == "serial":
+    if executor is None:
         return Serial()
     if isinstance(executor, str):
+        if executor == "serial":
+            return Serial()
         name, _, count = executor.partition(":")
         if name == "processes" and (not count or count.isdigit()):
             return Processes(int(count) if count else None)
-        if executor.startswith("dask://"):
+        if executor.startswith(_SCHEME):
             return Dask(executor)
-    elif hasattr(executor, "scheduler_info") and callable(getattr(executor, "submit", None)):
+    elif _is_client(executor):
         return Dask(executor)
     elif callable(getattr(executor, "run", None)):
         found: Executor = executor
         return found
     raise OptionError(
         "executor must be 'serial', 'processes', 'processes:N', 'dask://host:port', a Dask client "
-        f"or an object with a method run(task, jobs), got {executor!r}"
+        f"or an object with a method run(task, jobs), got {shown(executor)}"
     )
+
+
+def _is_client(given: Any) -> bool:
+    return hasattr(given, "scheduler_info") and callable(getattr(given, "submit", None))

@@ -11,7 +11,7 @@ import scipy.stats
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import read_only
-from ..base.options import instance, one_of, real
+from ..base.options import instance, one_of, real, shown
 from ..errors import ArrayError, MissingDependencyError, OptionError
 from ..maps.files import LoadedMap
 from ..mesh.meshes import TetMesh
@@ -110,9 +110,10 @@ def carry_field(
     """
     population = instance("population", population, Population, "stretchmap.population.fit(...)")
     one_of("conserve", conserve, ("integral", "value"))
+    one_of("name", name, population.names)
     places = {shape.name: shape for shape in population.shapes}
-    if name not in population.names or name not in places:
-        raise OptionError(f"no shape {name!r} was mapped; there are {', '.join(population.names)}")
+    if name not in places:
+        raise OptionError(f"where the shape {name!r} came from is not known; take a result of fit")
     solid = places[name].load()
     laid = TetMesh(population.correspondences[population.names.index(name)], population.mean.T)
     between = LoadedMap(
@@ -176,6 +177,11 @@ def field_statistics(
     if not hasattr(scipy.stats, "false_discovery_control"):
         raise MissingDependencyError("field statistics need SciPy 1.11: pip install 'scipy>=1.11'")
     against = real("against", against)
+    for what, given in (("fields", fields), ("group", {} if group is None else group)):
+        if not isinstance(given, Mapping):
+            raise OptionError(
+                f"{what} must be a mapping by the names of shapes, got {shown(given)}"
+            )
     names = tuple(fields)
     rows = [carry_field(population, n, fields[n], per=per, conserve=conserve) for n in names]
     if len(rows) < 2:

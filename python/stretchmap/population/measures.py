@@ -14,6 +14,8 @@ from .shape_model import ShapeModel, shape_model
 
 __all__ = ["ModelMeasures", "measure_model"]
 
+_MOST_SAMPLES = 1_000_000
+
 Array = NDArray[np.float64]
 
 
@@ -59,7 +61,7 @@ def measure_model(model: ShapeModel, *, n_samples: int = 200, seed: int = 0) -> 
     ----------
     model : ShapeModel
     n_samples : int
-        Random shapes drawn for the specificity.
+        Random shapes drawn for the specificity, at most a million.
     seed : int
 
     Returns
@@ -83,7 +85,7 @@ def measure_model(model: ShapeModel, *, n_samples: int = 200, seed: int = 0) -> 
     True
     """
     model = instance("model", model, ShapeModel, "shape_model(shapes)")
-    n_samples, seed = whole("n_samples", n_samples, 1), whole("seed", seed, 0)
+    n_samples, seed = whole("n_samples", n_samples, 1, _MOST_SAMPLES), whole("seed", seed, 0)
     shapes = model.reconstruct(model.scores)
     if len(shapes) < 3:
         raise ArrayError(f"leaving one out needs three shapes or more, got {len(shapes)}")

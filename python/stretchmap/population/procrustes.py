@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import as_reals, read_only
-from ..base.options import flag
+from ..base.arrays import as_points, as_reals, read_only
+from ..base.options import flag, real
 from ..errors import ArrayError, DegenerateError, SolverError
 
 __all__ = ["Procrustes", "Similarity", "generalized_procrustes", "similarity_onto"]
 
 _MOST_ITERATIONS, _AT_REST = 200, 1e-12
+_NO_ROTATION = 1e-8
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,11 @@ class Similarity:
     factor : float
     shift : ndarray, shape (3,)
 
+    Raises
+    ------
+    ArrayError, NonFiniteError, OptionError
+        An array of another shape, no rotation, or a factor that is not positive.
+
     Examples
     --------
     >>> import numpy as np
@@ -42,13 +48,29 @@ class Similarity:
     factor: float
     shift: Array
 
+    def __post_init__(self) -> None:
+        rotation = as_reals(self.rotation, "rotation", (3, 3))
+        off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+        if off > _NO_ROTATION or not np.linalg.det(rotation) > 0.0:
+            raise ArrayError("rotation must be orthogonal with determinant 1")
+        object.__setattr__(self, "rotation", rotation)
+        object.__setattr__(self, "factor", real("factor", self.factor, above=0.0))
+        object.__setattr__(self, "shift", as_reals(self.shift, "shift", (3,)))
+
     def __call__(self, points: ArrayLike) -> Array:
-        """Points (n, 3) moved."""
-        return np.asarray(self.factor * np.asarray(points) @ self.rotation + self.shift)
+        """Points (n, 3) moved.
+
+        Raises
+        ------
+        ArrayError, NonFiniteError
+            No such array.
+        """
+        return np.asarray(self.factor * as_points(points, "points") @ self.rotation + self.shift)
 
     def back(self, points: ArrayLike) -> Array:
-        """Points (n, 3) moved back."""
-        return np.asarray((np.asarray(points) - self.shift) @ self.rotation.T / self.factor)
+        """Points (n, 3) moved back; as a call."""
+        away = as_points(points, "points") - self.shift
+        return np.asarray(away @ self.rotation.T / self.factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +122,8 @@ def similarity_onto(points: Array, goal: Array, scale: bool = True) -> Similarit
     if not S.sum() > 0.0:
         raise DegenerateError("shapes of no extent cannot be laid on each other")
     factor = float(np.einsum("ni,ni->", q, q) / S.sum()) if scale else 1.0
+    if not factor > 0.0:
+        raise DegenerateError("shapes cannot be laid on a single point")
     return Similarity(rotation, factor, aim - factor * middle @ rotation)
 
 

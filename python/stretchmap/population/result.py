@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import as_reals
 from ..base.files import atomic_path
-from ..base.options import as_path, real
+from ..base.options import as_path, one_of, real, whole
 from ..base.tables import HasSummary, plain_dict, table, versions
 from ..certificate.findings import Certificate
 from ..errors import FileFormatError, OptionError
@@ -107,7 +108,8 @@ class Population(HasSummary):
         ArrayError, NonFiniteError
             No such scores.
         """
-        return TetMesh(self.model.reconstruct(np.ravel(scores)), self.mean.T)
+        scores = as_reals(scores, "scores", (None,))
+        return TetMesh(self.model.reconstruct(scores), self.mean.T)
 
     def sample(self, n: int = 1, seed: int = 0) -> tuple[TetMesh, ...]:
         """Random solids of the population, see `ShapeModel.sample`.
@@ -127,7 +129,7 @@ class Population(HasSummary):
         OptionError
             There is no such mode.
         """
-        if not 0 <= number < self.model.n_modes:
+        if whole("number", number, 0) >= self.model.n_modes:
             raise OptionError(f"there are {self.model.n_modes} modes, counted from 0; no {number}")
         amount = real("deviations", deviations) * np.sqrt(self.model.variances[number])
         return TetMesh(self.mean.V + amount * self.model.modes[number], self.mean.T)
@@ -175,8 +177,7 @@ class Population(HasSummary):
         OptionError
             There is no such shape, or the run kept no maps.
         """
-        if name not in self.names:
-            raise OptionError(f"no shape {name!r} was mapped; there are {', '.join(self.names)}")
+        one_of("name", name, self.names)
         if self.folder is None:
             raise OptionError("no maps were kept; name a run folder, fit(..., folder='run')")
         return load_map(self.folder / "maps" / f"{name}.npz")

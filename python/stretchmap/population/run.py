@@ -20,19 +20,16 @@ from ..base.arrays import read_only
 from ..base.files import atomic_path
 from ..base.options import as_path, callback, flag, one_of, real, whole
 from ..base.progress import Progress, report
-from ..certificate.checks import certify
-from ..certificate.findings import Certificate
 from ..errors import OptionError, SolverError, StretchmapError
 from ..io.npz import save_npz
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import refine_overconstrained
-from ..volume.fill import fill
-from ..volume.options import FillOptions
 from .correspondence import Along
 from .executors import Executor, as_executor
 from .fitting import Anchors
-from .procrustes import generalized_procrustes, similarity_onto
+from .mean import certified_mean, movement
+from .procrustes import generalized_procrustes
 from .result import Population
 from .shape_model import shape_model
 from .shapes import Shape, gather_landmarks, gather_shapes
@@ -137,7 +134,11 @@ def fit(
     # put in once they are in every map and in the mean.
     solid = refine_overconstrained(solid).solid
     with ExitStack() as stack:
-        place = as_path(folder or stack.enter_context(tempfile.TemporaryDirectory()))
+        place = (
+            Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            if folder is None
+            else as_path(folder)
+        )
         _prepare(place, {"along": along, "scale": scale, "volume_weight": volume_weight})
         anchors = None if marks is None else Anchors.of(solid.surface, marks)
         run = _Run(place, shapes, workers, along, scale, volume_weight, progress)
@@ -218,12 +219,12 @@ class _Run:
             # Smooth deformations are averaged: points that were put onto surfaces crowd at their
             # edges, more so with every round.
             average = np.mean([m(x) for m, x in zip(poses.moves, smooth, strict=True)], axis=0)
-            moved.append(_movement(solid, average))
+            moved.append(movement(solid, average))
             _log.info("round %d: the template moved by %.3g of its size", number, moved[-1])
             if moved[-1] <= tol or number == max_rounds - 1:
                 break
-            solid = _certified(solid, average, self.volume_weight)[0]
-        mean, certificate = _certified(solid, poses.mean, self.volume_weight)
+            solid = certified_mean(solid, average, self.volume_weight)[0]
+        mean, certificate = certified_mean(solid, poses.mean, self.volume_weight)
         at_rest = moved[-1] <= tol
         if not at_rest:
             _log.warning("the template is not at rest after %d rounds (tol=%g)", len(moved), tol)
@@ -266,38 +267,6 @@ class _Run:
             raise SolverError(f"{len(done)} shapes could be mapped, two are needed; {reason}")
         images, smooth = np.stack([np.load(jobs[i].image_file) for i in done], axis=1)
         return [records[i] for i in range(len(jobs))], images, smooth
-
-
-def _certified(solid: TetMesh, points: Array, weight: float) -> tuple[TetMesh, Certificate]:
-    """The template moved to the mean; inside as `fill` has it, where averaging turned a tet over.
-
-    Raises
-    ------
-    CertificationError, SelfIntersectionError
-        That does not help.
-    """
-    certificate = certify(solid, points)
-    if not certificate.certified:
-        options = FillOptions(volume_weight=weight, refine=False)
-        found = fill(solid, points[solid.boundary_vertices], options=options)
-        points, certificate = found.image, found.certificate
-    return TetMesh(points, solid.T), certificate
-
-
-def _movement(solid: TetMesh, after: Array) -> float:
-    """Root mean square way of the surface along its normals, in the same pose, over the size.
-
-    Along the surface the vertices of a template may go on moving, slowly and all shapes alike:
-    that changes neither its shape nor what corresponds.
-    """
-    skin, surface = solid.boundary_vertices, solid.surface
-    ways = similarity_onto(solid.V, after)(solid.V)[skin] - after[skin]
-    corners = after[skin][surface.F]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(areas, axis=1)
-    along = np.einsum("mx,mx->m", ways[surface.F].mean(axis=1), areas) / lengths
-    size = float(np.linalg.norm(np.ptp(after, axis=0)))
-    return float(np.sqrt((lengths * along**2).sum() / lengths.sum())) / size
 
 
 def _write_template(path: Path, solid: TetMesh, anchors: Anchors | None) -> str:

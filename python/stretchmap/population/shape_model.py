@@ -9,7 +9,7 @@ import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import as_reals, read_only
-from ..base.options import whole
+from ..base.options import memory, whole
 from ..errors import ArrayError, OptionError
 
 __all__ = ["ShapeModel", "shape_model"]
@@ -109,6 +109,7 @@ class ShapeModel:
         """
         n, seed = whole("n", n, 1), whole("seed", seed, 0)
         count = self._count(n_modes)
+        memory(f"{n} shapes", 16.0 * n * self.mean.size)
         drawn = np.random.default_rng(seed).standard_normal((n, count))
         return self.reconstruct(drawn * np.sqrt(self.variances[:count]))
 

@@ -21,6 +21,8 @@ ATTACK = Path(__file__).resolve().parents[2] / "attack"
         ("stretchmap.load_map", 20),
         ("stretchmap.prepare", 140),
         ("Options", 1000),
+        ("population.", 600),
+        ("Population.", 150),
     ],
 )
 def test_no_hostile_argument_gets_through(only, least):

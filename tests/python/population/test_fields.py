@@ -70,7 +70,7 @@ def test_a_field_that_does_not_vary_has_no_t(bones, found):
 
 def test_what_does_not_fit_is_refused(bones, found):
     good = fields(bones, found)
-    with pytest.raises(OptionError, match="no shape 'x'"):
+    with pytest.raises(OptionError, match="name must be '0', '1'"):
         sm.population.carry_field(found, "x", good["0"])
     with pytest.raises(ArrayError):
         sm.population.carry_field(found, "0", good["0"][:-1])
