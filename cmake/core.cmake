@@ -6,16 +6,27 @@ target_link_libraries(stretchmap_core PUBLIC Eigen3::Eigen)
 target_compile_definitions(stretchmap_core PUBLIC EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
 target_precompile_headers(stretchmap_core PRIVATE <stretchmap/base/types.hpp> <string> <vector>)
 
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT CMAKE_OSX_ARCHITECTURES MATCHES "arm64")
+  set(x86 ON)
+else()
+  set(x86 OFF)
+endif()
 if(MSVC)
   # Loops over 32-bit signed indices and nothing newer than OpenMP 2.0 are all that is asked of it.
+  # Templates make more sections than an object file has by default.
   set(warnings /W3)
-  target_compile_options(stretchmap_core PRIVATE ${warnings})
+  target_compile_options(stretchmap_core PRIVATE ${warnings} /bigobj /utf-8)
 else()
   set(warnings -Wall -Wextra -Wpedantic -Wshadow)
   set(strict $<$<BOOL:${STRETCHMAP_WERROR}>:-Werror>)
   # Nobody reads errno or traps: without them loops with roots and choices can be vectorized.
   target_compile_options(stretchmap_core PRIVATE ${warnings} -fno-math-errno -fno-trapping-math
                                                  ${strict})
+  if(NOT x86)
+    # The baseline of arm64 has a fused multiply-add: contraction would take the exactness from sums
+    # that know their own rounding, those of the predicates first of all.
+    target_compile_options(stretchmap_core PRIVATE -ffp-contract=off)
+  endif()
 endif()
 
 # Kernels for wider processors, chosen at run time. No contraction, so that all of them give the
@@ -28,7 +39,7 @@ if(NOT MSVC)
   set_source_files_properties(
     ${wide} PROPERTIES COMPILE_OPTIONS -ffp-contract=off SKIP_PRECOMPILE_HEADERS ON
                        SKIP_UNITY_BUILD_INCLUSION ON)
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT CMAKE_OSX_ARCHITECTURES MATCHES "arm64")
+  if(x86)
     set_source_files_properties(cpp/src/volume/tet_weights_avx2.cpp PROPERTIES
                                 COMPILE_OPTIONS "-ffp-contract=off;-mavx2")
     set_source_files_properties(cpp/src/volume/tet_weights_avx512.cpp PROPERTIES

@@ -34,6 +34,9 @@ void bind(py::module_& m);
 namespace stretchmap::volume {
 void bind(py::module_& m);
 }
+namespace stretchmap::energies {
+void bind(py::module_& m);
+}
 namespace stretchmap::registration {
 void bind(py::module_& m);
 }
@@ -72,6 +75,7 @@ PYBIND11_MODULE(_core, m) {
   room("partitions", stretchmap::partitions::bind);
   room("area", stretchmap::area::bind);
   room("volume", stretchmap::volume::bind);
+  room("energies", stretchmap::energies::bind);
   room("registration", stretchmap::registration::bind);
   room("resample", stretchmap::resample::bind);
   room("testing", stretchmap::testing::bind);

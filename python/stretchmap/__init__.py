@@ -36,6 +36,7 @@ if hasattr(os, "register_at_fork"):
 # What type checkers see; at run time `_EXPORTS` loads the same names on first use, so that
 # `import stretchmap` stays fast.
 if TYPE_CHECKING:
+    from . import energies as energies
     from . import errors as errors
     from . import plot as plot
     from . import population as population
@@ -157,7 +158,7 @@ _EXPORTS = {
     "Morph": "plot.morphing",
     "morph": "plot.morphing",
 }
-_ROOMS = ("errors", "plot", "population", "samples")
+_ROOMS = ("energies", "errors", "plot", "population", "samples")
 
 __all__ = ["__version__", *_EXPORTS, *_ROOMS]
 

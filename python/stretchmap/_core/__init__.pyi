@@ -13,7 +13,8 @@ from . import certificate
 from . import partitions
 from . import area
 from . import volume
+from . import energies
 from . import registration
 from . import resample
 from . import testing
-__all__: list[str] = ['area', 'base', 'certificate', 'forms', 'homology', 'linalg', 'maps', 'measures', 'mesh', 'partitions', 'registration', 'resample', 'testing', 'volume']
+__all__: list[str] = ['area', 'base', 'certificate', 'energies', 'forms', 'homology', 'linalg', 'maps', 'measures', 'mesh', 'partitions', 'registration', 'resample', 'testing', 'volume']

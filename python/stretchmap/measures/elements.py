@@ -200,7 +200,7 @@ def distortion(
         measures = _core.measures.face_measures(mesh.V, elements, points, sign)
         factor = 1.0
     source, target = measures.source, measures.image
-    _check_source(source)
+    require_sizes(source)
 
     source_total, image_total = float(source.sum()), float(target.sum())
     if image_total == 0.0:
@@ -242,7 +242,8 @@ def distortion(
     )
 
 
-def _check_source(source: NDArray[np.float64]) -> None:
+def require_sizes(source: NDArray[np.float64]) -> None:
+    """Raise where a source element has no positive area or volume; ``ids`` are the elements."""
     if not len(source):
         raise DegenerateError("the mesh has no elements")
     inverted = np.flatnonzero(source < 0.0)

@@ -21,7 +21,7 @@ CHAIN = (
     ("conformal", "certificate", "partitions", "preparation"),
     ("area",),
     ("volume",),
-    ("registration",),
+    ("registration", "energies"),
     ("resample",),
     ("population",),
     ("plot",),

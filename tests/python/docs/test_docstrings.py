@@ -15,8 +15,15 @@ import pytest
 
 import stretchmap
 
-ROOMS = ("samples", "io", "population", "plot", "plot.scene", "plot.report", "mesh.refinement")
-ROOMS += (
+ROOMS = (
+    "energies",
+    "samples",
+    "io",
+    "population",
+    "plot",
+    "plot.scene",
+    "plot.report",
+    "mesh.refinement",
     "mesh.overconstrained",
     "registration.suggest",
     "conformal.hodge",

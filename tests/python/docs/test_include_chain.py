@@ -14,7 +14,7 @@ CHAIN = (
     {"certificate", "partitions"},
     {"area"},
     {"volume"},
-    {"registration"},
+    {"registration", "energies"},
     {"resample"},
 )
 LEVEL = {room: level for level, rooms in enumerate(CHAIN) for room in rooms}
