@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from . import plot as plot
     from . import population as population
     from . import samples as samples
-    from .area.map import AreaMap as AreaMap
     from .area.map import area_map as area_map
+    from .area.result import AreaMap as AreaMap
     from .base.progress import Progress as Progress
     from .base.threads import threads as threads
     from .base.torus import Torus as Torus
@@ -140,7 +140,7 @@ _EXPORTS = {
     "compare": "certificate.comparison",
     "Partition": "partitions.parts",
     "partition": "partitions.parts",
-    "AreaMap": "area.map",
+    "AreaMap": "area.result",
     "area_map": "area.map",
     "FillMap": "volume.fill",
     "FillOptions": "volume.options",

@@ -7,6 +7,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from stretchmap import Torus, TriMesh, _core
 from stretchmap.maps.files import LoadedMap
 
 # The six tets of a cube round its diagonal: neighbouring cubes then agree on their common square.
@@ -74,3 +75,20 @@ def a_map(solid, image, torus=None):
         stop_reason="",
         seconds={},
     )
+
+
+def torus_grid(nu: int, nv: int, ratio: float, seed: int | None = None) -> TriMesh:
+    """Torus of revolution sampled evenly in the equal-area coordinates (u, s)."""
+    i, j = np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij")
+    u, s = 2.0 * np.pi * i.ravel() / nu, 2.0 * np.pi * j.ravel() / nv
+    v = _core.area.angle_from_equal_area(s, 1.0 / ratio)
+    points = Torus(ratio, 1.0).xi(u, v)
+    a, b = i.ravel() * nv + j.ravel(), ((i.ravel() + 1) % nu) * nv + j.ravel()
+    c = ((i.ravel() + 1) % nu) * nv + (j.ravel() + 1) % nv
+    d = i.ravel() * nv + (j.ravel() + 1) % nv
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    if seed is not None:
+        order = np.random.default_rng(seed).permutation(len(points))
+        inverse = np.argsort(order)
+        points, faces = points[order], inverse[faces]
+    return TriMesh(points, faces)

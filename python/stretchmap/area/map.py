@@ -6,11 +6,7 @@ import dataclasses
 import logging
 import math
 import time
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Literal
 
 from .. import _core
 from ..base.arrays import read_only
@@ -19,21 +15,20 @@ from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..certificate.checks import certify
-from ..certificate.findings import Certificate
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import CertificationError, OptionError
 from ..homology.basis import HomologyBasis
-from ..maps.result import MapResult
 from ..mesh.given import as_surface, require_same_mesh
 from .balance import JAMMED, balance_areas
 from .finish import finish_areas, unfold_faces
+from .result import AreaMap
 from .search import Ratio, search_phase
 from .sem import minimize_stretch, start_angles, unfolded_turns
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["AreaMap", "Finish", "area_map", "finished"]
+__all__ = ["Finish", "area_map", "finished"]
 
 Finish = Literal["ring", "face", "none"]
 
@@ -43,89 +38,6 @@ _log = logging.getLogger("stretchmap")
 _MAX_ASPECT = 10.0
 
 _MOST_TURNS = 1e3  # a phase may have
-
-
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class AreaMap(MapResult):
-    """An area-preserving map onto a torus of revolution.
-
-    Attributes
-    ----------
-    mesh : TriMesh
-        The source.
-    angles : ndarray, shape (n, 2)
-        Angles (u, v) of the image in radians, not reduced to one turn: ``2 pi forms + d angles`` is
-        the change along an edge. They do not depend on the size of the torus.
-    image : ndarray, shape (n, 3)
-        Points on ``torus``.
-    torus : Torus
-        Torus with the surface's area and the ratio of radii in ``ratio``.
-    phase : float
-        Turns of the equal-area coordinate around the tube that were added to the conformal map's.
-    ratio : float
-        ``R / r`` of the torus.
-    forms : ndarray, shape (2, e), int32
-        Integer closed 1-forms of u and v, as in `ConformalMap`.
-    history : tuple of IterationRecord
-        One record per iteration: stage ``"sem"`` measured in the equal-area chart, its energy E_S
-        (4.1) of shares, at least 1; stage ``"balance"``, Newton steps in that chart where the
-        first jams; stages ``"untangle"`` and ``"newton"`` on the polyhedral image, the energy of
-        the latter that of the finishing solve over the weight of its area term: within ``"sem"``
-        and ``"newton"`` it never rises. There ``flips`` are the faces that do not look outward
-        along the whole face, what the certificate checks.
-    certificate : Certificate
-        Whether the map is proven to be one to one, computed independently of how it was found.
-    distortion : Distortion
-        Of the polyhedral image; a face is flipped where it looks into the torus.
-    converged : bool
-    stop_reason : str
-    seconds : dict
-        Wall-clock time per stage.
-
-    Examples
-    --------
-    >>> import stretchmap as sm
-    >>> result = sm.area_map(sm.samples.torus_surface(24, 12))
-    >>> larger = sm.Torus.from_ratio(result.ratio, area=4.0 * result.torus.area)
-    >>> result.image_on(larger).shape
-    (288, 3)
-    """
-
-    _title: ClassVar[str] = "area"
-
-    mesh: TriMesh
-    torus: Torus = field()
-    angles: NDArray[np.float64] = field(repr=False)
-    phase: float
-    ratio: float
-    forms: NDArray[np.int32] = field(repr=False)
-    certificate: Certificate = field(repr=False)
-
-    def extra_arrays(self) -> dict[str, NDArray[Any]]:
-        """``angles`` (n, 2) and ``forms`` (2, e)."""
-        return {"angles": self.angles, "forms": self.forms}
-
-    def extra_scalars(self) -> dict[str, Any]:
-        """``phase`` and ``ratio``, and what the certificate says."""
-        return {
-            "phase": self.phase,
-            "ratio": self.ratio,
-            "certified": self.certificate.certified,
-            "certificate": self.certificate.to_dict(),
-        }
-
-    def image_on(self, torus: Torus) -> NDArray[np.float64]:
-        """The same map on a torus of another size, (n, 3).
-
-        Raises
-        ------
-        OptionError
-            If the torus has another ratio of radii: the map would not preserve areas there.
-        """
-        instance("torus", torus, Torus, "Torus(R, r)")
-        if not math.isclose(torus.ratio, self.ratio, rel_tol=1e-9):
-            raise OptionError(f"the map is for R / r = {self.ratio}, the torus has {torus.ratio}")
-        return torus.xi(self.angles[:, 0], self.angles[:, 1])
 
 
 @takes_threads
@@ -185,7 +97,7 @@ def area_map(
     balance : float
         From 0, the Newton steps keep shapes as well as areas, to 1, areas alone: the power to which
         the largest weight of the area term is raised. Below 1 they end where the energy is at rest,
-        no matter what ``tol`` is, and rings are left as they come.
+        no matter what ``tol`` is, and rings are left as they come. Not with ``finish="none"``.
     sem_iter : int
         Most steps of stretch energy minimisation.
     keep_best : bool
@@ -230,6 +142,8 @@ def area_map(
     _check_options(torus, phase, ratio, finish)
     _check_numbers(max_iter, tol, shape_budget, sem_iter)
     balance = real("balance", balance, 0.0, 1.0)
+    if finish == "none" and balance < 1.0:
+        raise OptionError("balance acts in the finishing steps: take finish='ring' or 'face'")
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     if basis is not None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-from ..area.map import AreaMap, area_map, finished
+from ..area.map import area_map, finished
+from ..area.result import AreaMap
 from ..base.progress import Progress
 from ..mesh.meshes import TetMesh, TriMesh
 from .anisotropy import unstretching

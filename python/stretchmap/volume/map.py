@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..area.map import AreaMap, area_map
+from ..area.map import area_map
+from ..area.result import AreaMap
 from ..base.arrays import read_only
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress

@@ -1,0 +1,104 @@
+"""What `area_map` returns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.options import instance
+from ..base.torus import Torus
+from ..certificate.findings import Certificate
+from ..errors import OptionError
+from ..maps.result import MapResult
+
+if TYPE_CHECKING:
+    from ..mesh.meshes import TriMesh
+
+__all__ = ["AreaMap"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class AreaMap(MapResult):
+    """An area-preserving map onto a torus of revolution.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+        The source.
+    angles : ndarray, shape (n, 2)
+        Angles (u, v) of the image in radians, not reduced to one turn: ``2 pi forms + d angles`` is
+        the change along an edge. They do not depend on the size of the torus.
+    image : ndarray, shape (n, 3)
+        Points on ``torus``.
+    torus : Torus
+        Torus with the surface's area and the ratio of radii in ``ratio``.
+    phase : float
+        Turns of the equal-area coordinate around the tube that were added to the conformal map's.
+    ratio : float
+        ``R / r`` of the torus.
+    forms : ndarray, shape (2, e), int32
+        Integer closed 1-forms of u and v, as in `ConformalMap`.
+    history : tuple of IterationRecord
+        One record per iteration: stage ``"sem"`` measured in the equal-area chart, its energy E_S
+        (4.1) of shares, at least 1; stage ``"balance"``, Newton steps in that chart where the
+        first jams; stages ``"untangle"`` and ``"newton"`` on the polyhedral image, the energy of
+        the latter that of the finishing solve over the weight of its area term: within ``"sem"``
+        and ``"newton"`` it never rises. There ``flips`` are the faces that do not look outward
+        along the whole face, what the certificate checks.
+    certificate : Certificate
+        Whether the map is proven to be one to one, computed independently of how it was found.
+    distortion : Distortion
+        Of the polyhedral image; a face is flipped where it looks into the torus.
+    converged : bool
+    stop_reason : str
+    seconds : dict
+        Wall-clock time per stage.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> result = sm.area_map(sm.samples.torus_surface(24, 12))
+    >>> larger = sm.Torus.from_ratio(result.ratio, area=4.0 * result.torus.area)
+    >>> result.image_on(larger).shape
+    (288, 3)
+    """
+
+    _title: ClassVar[str] = "area"
+
+    mesh: TriMesh
+    torus: Torus = field()
+    angles: NDArray[np.float64] = field(repr=False)
+    phase: float
+    ratio: float
+    forms: NDArray[np.int32] = field(repr=False)
+    certificate: Certificate = field(repr=False)
+
+    def extra_arrays(self) -> dict[str, NDArray[Any]]:
+        """``angles`` (n, 2) and ``forms`` (2, e)."""
+        return {"angles": self.angles, "forms": self.forms}
+
+    def extra_scalars(self) -> dict[str, Any]:
+        """``phase`` and ``ratio``, and what the certificate says."""
+        return {
+            "phase": self.phase,
+            "ratio": self.ratio,
+            "certified": self.certificate.certified,
+            "certificate": self.certificate.to_dict(),
+        }
+
+    def image_on(self, torus: Torus) -> NDArray[np.float64]:
+        """The same map on a torus of another size, (n, 3).
+
+        Raises
+        ------
+        OptionError
+            If the torus has another ratio of radii: the map would not preserve areas there.
+        """
+        instance("torus", torus, Torus, "Torus(R, r)")
+        if not math.isclose(torus.ratio, self.ratio, rel_tol=1e-9):
+            raise OptionError(f"the map is for R / r = {self.ratio}, the torus has {torus.ratio}")
+        return torus.xi(self.angles[:, 0], self.angles[:, 1])
