@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from stretchmap import Torus, TriMesh, _core
+from stretchmap import TetMesh, Torus, TriMesh, _core, samples
 from stretchmap.maps.files import LoadedMap
 
 # The six tets of a cube round its diagonal: neighbouring cubes then agree on their common square.
@@ -92,3 +92,12 @@ def torus_grid(nu: int, nv: int, ratio: float, seed: int | None = None) -> TriMe
         inverse = np.argsort(order)
         points, faces = points[order], inverse[faces]
     return TriMesh(points, faces)
+
+
+def thin_wall(thickness, n_tets=12_000):
+    """A short tube: the section of the solid torus pressed flat along the radius."""
+    solid = samples.solid_torus(n_tets)
+    x, y, z = solid.V.T
+    radius = np.hypot(x, y)
+    scale = (1.0 + thickness * (radius - 3.0)) / radius
+    return TetMesh(np.stack([x * scale, y * scale, z], axis=1), solid.T)

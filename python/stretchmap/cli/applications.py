@@ -82,7 +82,8 @@ def register_solids(
     inputs = [path for path in (input, target, landmarks) if path is not None]
     common.check_outputs(output, common.map_suffixes(), json, *inputs)
     watch = common.Stopwatch()
-    source, goal = (_solid_torus(path, orient, compact) for path in (input, target))
+    source, fields = _solid_torus(input, orient, compact)
+    goal, _ = _solid_torus(target, orient, compact)
     marks = None if landmarks is None else read_landmarks(landmarks, source, goal, within=within)
     watch.lap("read")
     with terminal(quiet) as bar:
@@ -96,7 +97,7 @@ def register_solids(
             progress=bar,
         )
     watch.lap("compute")
-    conclude(result, output, json, quiet, watch)
+    conclude(result.with_fields(*fields), output, json, quiet, watch)
     if not result.certificate.certified:
         _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
         return 1
@@ -261,14 +262,15 @@ def morph(
         typer.echo(f"written to {output}{beside}")
 
 
-def _solid_torus(path: Path, orient: bool, compact: bool) -> TetMesh:
-    """One of two meshes; what is wrong with it is told with its name."""
-    mesh = common.require_solid(common.read_mesh(path, orient, compact), path, "register")
+def _solid_torus(path: Path, orient: bool, compact: bool) -> tuple[TetMesh, common.Fields]:
+    """One of two meshes with its data; what is wrong with it is told with its name."""
+    found, fields = common.read_with_fields(path, orient, compact)
+    mesh = common.require_solid(found, path, "register")
     try:
         mesh.require_solid_torus()
     except MeshError as error:
         raise type(error)(f"{path}: {error}", error.ids) from None
-    return mesh
+    return mesh, fields
 
 
 def _solid_map(path: Path, command: str) -> LoadedMap:

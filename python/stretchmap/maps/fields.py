@@ -48,7 +48,7 @@ def carried(
     n, m = len(mesh.V), len(elements)
     n_given, m_given = n, m
     if refinement is not None:
-        n_given, m_given = n - refinement.n_split, int(refinement.parent_tet[-1]) + 1
+        n_given, m_given = n - refinement.n_split, refinement.n_given_tets
     points = _own(checked(point_data, _rows(point_data, n, n_given), "point_data"))
     cells = _own(checked(cell_data, _rows(cell_data, m, m_given), "cell_data"))
     if refinement is not None:
@@ -87,8 +87,10 @@ def _rows(data: Mapping[str, ArrayLike] | None, own: int, given: int) -> int:
 def _first_parents(refinement: Refinement, n: int) -> NDArray[np.intp]:
     """Vertex of the input each vertex is, or comes from."""
     origin = np.arange(n)
+    for ids, _ in refinement.on_edges:
+        origin = np.concatenate([origin, origin[ids[:, 0]]])
     origin = np.concatenate(
-        [origin, *(ids[:, 0] for ids in (refinement.parents, refinement.face_parents))]
+        [origin, *(origin[ids[:, 0]] for ids in (refinement.parents, refinement.face_parents))]
     )
     for ids in refinement.halved:
         origin = np.concatenate([origin, origin[ids[:, 0]]])

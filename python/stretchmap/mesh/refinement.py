@@ -20,7 +20,7 @@ from .. import _core
 from ..base.arrays import read_only
 from ..errors import ArrayError
 from .meshes import TetMesh
-from .split_edges import TET_EDGES, split_edges
+from .split_edges import TET_EDGES, SplitSolid, split_edges
 
 __all__ = ["Refinement", "refine_overconstrained"]
 
@@ -32,18 +32,20 @@ class Refinement:
     Attributes
     ----------
     solid : TetMesh
-        Its first n vertices are those of the input, unchanged, and its boundary is the same. Then
-        follow the midpoints of ``parents``, the centroids of ``face_parents`` and the midpoints of
-        ``halved``.
+        Its first n vertices are those of the input, unchanged, and its boundary is the same but for
+        the edges of ``on_edges``. Then follow the points of ``on_edges``, the midpoints of
+        ``parents``, the centroids of ``face_parents`` and the midpoints of ``halved``.
     parents : (a, 2) ndarray of int32
         Vertices of the edge each added midpoint halves.
     face_parents : (b, 3) ndarray of int32
         Vertices of the face each added centroid lies in.
     parent_tet : (k',) ndarray of int32
-        Input tet of each tet, ascending.
+        Input tet of each tet, ascending if ``on_edges`` is empty.
     halved : tuple of (c, 2) ndarrays of int32
         Edges halved after that, those of one pass in one array; their ends may have been added
         before.
+    on_edges : tuple of (ndarray of int32, shape (d, 2); ndarray, shape (d,))
+        Edges split before all else, and where, see `SplitSolid`.
 
     Examples
     --------
@@ -62,16 +64,23 @@ class Refinement:
     face_parents: NDArray[np.int32]
     parent_tet: NDArray[np.int32]
     halved: tuple[NDArray[np.int32], ...] = ()
+    on_edges: tuple[tuple[NDArray[np.int32], NDArray[np.float64]], ...] = ()
 
     @property
     def n_split(self) -> int:
         """Number of edges and faces split: the number of added vertices."""
-        return sum(map(len, (self.parents, self.face_parents, *self.halved)))
+        before = (edges for edges, _ in self.on_edges)
+        return sum(map(len, (*before, self.parents, self.face_parents, *self.halved)))
 
     @property
     def n_added_tets(self) -> int:
         """Number of tets beyond those of the input."""
-        return len(self.parent_tet) - (int(self.parent_tet[-1]) + 1)
+        return len(self.parent_tet) - self.n_given_tets
+
+    @property
+    def n_given_tets(self) -> int:
+        """Number of tets of the input."""
+        return int(self.parent_tet.max()) + 1
 
     def prolong(self, values: ArrayLike) -> NDArray[np.float64]:
         """Carry values over to the added vertices by averaging their parents.
@@ -95,12 +104,33 @@ class Refinement:
         n = self.solid.n_vertices - self.n_split
         if array.ndim == 0 or len(array) != n:
             raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
+        for ends, shares in self.on_edges:
+            share = shares.reshape(-1, *np.ones(array.ndim - 1, int))
+            between = (1.0 - share) * array[ends[:, 0]] + share * array[ends[:, 1]]
+            array = np.concatenate([array, between])
         rows: list[NDArray[Any]] = [array]
         rows += [array[ids].mean(axis=1) for ids in (self.parents, self.face_parents) if len(ids)]
         array = np.concatenate(rows)
         for ids in self.halved:
             array = np.concatenate([array, array[ids].mean(axis=1)])
         return array
+
+    @classmethod
+    def of(cls, split: SplitSolid) -> Refinement:
+        """What was split, and nothing else."""
+        edges, faces = np.zeros((0, 2), np.int32), np.zeros((0, 3), np.int32)
+        return cls(split.solid, edges, faces, split.parent_tet, on_edges=split.passes)
+
+    def after(self, split: SplitSolid) -> Refinement:
+        """The same of the solid whose edges were split before.
+
+        Parameters
+        ----------
+        split : SplitSolid
+            What was refined is its solid.
+        """
+        parent = read_only(split.parent_tet[self.parent_tet])
+        return dataclasses.replace(self, parent_tet=parent, on_edges=split.passes)
 
     def halve(self, edges: NDArray[np.int32]) -> Refinement:
         """Halve interior edges of ``solid``, with all tets round them; none may be left over.

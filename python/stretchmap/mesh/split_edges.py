@@ -1,4 +1,4 @@
-"""Edges of a tet mesh split at their midpoints."""
+"""Edges of a tet mesh split in two, and the way back."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import read_only
 from .meshes import TetMesh
 
 TET_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
@@ -70,3 +71,42 @@ def split_edges(solid: TetMesh, edges: NDArray[np.int32], shares: NDArray[np.flo
     V = np.concatenate([solid.V, (1.0 - share) * ends[:, 0] + share * ends[:, 1]])
     parent = np.concatenate([np.flatnonzero(new < 0), cut, cut])
     return EdgeSplit(TetMesh(V, T), kept, parent)
+
+
+@dataclass(frozen=True, eq=False)
+class SplitSolid:
+    """A solid some of whose edges were split, pass by pass.
+
+    Attributes
+    ----------
+    solid : TetMesh
+        Its first n vertices are those of the input.
+    parent_tet : ndarray of int32, shape (k',)
+        Input tet of each tet.
+    passes : tuple of (ndarray of int32, shape (a, 2); ndarray, shape (a,))
+        The edges split in each pass, and where, as a share of the way from the first end; the ends
+        may have been added before.
+    """
+
+    solid: TetMesh
+    parent_tet: NDArray[np.int32]
+    passes: tuple[tuple[NDArray[np.int32], NDArray[np.float64]], ...] = ()
+
+    @classmethod
+    def of(cls, solid: TetMesh) -> SplitSolid:
+        """A solid as it is."""
+        return cls(solid, read_only(np.arange(solid.n_tets, dtype=np.int32)))
+
+    @property
+    def n_split(self) -> int:
+        """Number of added vertices."""
+        return sum(len(edges) for edges, _ in self.passes)
+
+    def split(
+        self, edges: NDArray[np.int32], shares: NDArray[np.float64]
+    ) -> tuple[SplitSolid, NDArray[np.intp]]:
+        """One pass more, and which of the edges it split; see `split_edges`."""
+        done = split_edges(self.solid, edges, shares)
+        added = read_only(edges[done.kept]), read_only(shares[done.kept])
+        parent = read_only(self.parent_tet[done.parent_tet])
+        return SplitSolid(done.solid, parent, (*self.passes, added)), done.kept

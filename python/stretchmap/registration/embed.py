@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..mesh.meshes import TetMesh, TriMesh
-from ..mesh.split_edges import split_edges
+from ..mesh.split_edges import SplitSolid
 from .flat_torus import FlatSurface, wrapped
 from .match import SurfaceProblem
 from .overlay import overlay_splits
@@ -38,7 +38,7 @@ def unfold_boundary(
     source: TetMesh,
     y: NDArray[np.float64],
     bend: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-) -> tuple[TetMesh, NDArray[np.float64], NDArray[np.intp]]:
+) -> tuple[SplitSolid, NDArray[np.float64], NDArray[np.intp]]:
     """Split boundary edges of the source until a map of the flat torus turns no face over.
 
     Parameters
@@ -51,24 +51,24 @@ def unfold_boundary(
 
     Returns
     -------
-    solid : TetMesh
+    split : SplitSolid
         The source, refined.
     bent : ndarray, shape (nb', 2)
         Each boundary vertex of it after the map.
     folded : ndarray of intp
         Faces that are still turned over.
     """
-    solid = source
+    split = SplitSolid.of(source)
     for _ in range(_ROUNDS):
-        F, bent = solid.surface.F, bend(y)
+        F, bent = split.solid.surface.F, bend(y)
         sides = wrapped(bent[F[:, 1:]] - bent[F[:, :1]])
         folded = np.flatnonzero(~(np.linalg.det(sides) > 0.0))
         if not len(folded) or len(y) > (1.0 + _MOST_ADDED) * source.surface.n_vertices:
             break
         edges, shares, where = _worst_edges(F[folded], y, bend)
-        split = split_edges(solid, solid.boundary_vertices[edges], shares)
-        solid, y = split.solid, np.concatenate([y, where[split.kept]])
-    return solid, bent, folded
+        split, kept = split.split(split.solid.boundary_vertices[edges], shares)
+        y = np.concatenate([y, where[kept]])
+    return split, bent, folded
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class EmbeddedBoundary:
 
     Attributes
     ----------
-    solid : TetMesh
-        The source, boundary edges split where that was needed; the first vertices are its own.
+    split : SplitSolid
+        The source, boundary edges split where that was needed.
     points : ndarray, shape (nb, 3)
         Image of each of its boundary vertices, on the target's surface.
     crossings : ndarray of int32, shape (c, 2)
@@ -86,13 +86,13 @@ class EmbeddedBoundary:
         source as it was given, which is then returned.
     """
 
-    solid: TetMesh
+    split: SplitSolid
     points: NDArray[np.float64]
     crossings: NDArray[np.int32]
 
 
 def embed_boundary(
-    source: TetMesh,
+    source: SplitSolid,
     target: FlatSurface,
     y: NDArray[np.float64],
     points: NDArray[np.float64],
@@ -102,7 +102,7 @@ def embed_boundary(
 
     Parameters
     ----------
-    source : TetMesh
+    source : SplitSolid
     target : FlatSurface
     y : ndarray, shape (nb, 2)
         Image of each boundary vertex in the target's flat torus, free of folds, faces smaller than
@@ -112,7 +112,7 @@ def embed_boundary(
     held : ndarray of int32
         Boundary vertices that stay where they are: landmarks.
     """
-    crossings = _core.certificate.crossing_faces(points, source.surface.F, _MOST_PAIRS)
+    crossings = _core.certificate.crossing_faces(points, source.solid.surface.F, _MOST_PAIRS)
     start = EmbeddedBoundary(source, points, crossings)
     for way in (_follow, _overlay):
         if not len(crossings):
@@ -130,20 +130,20 @@ def _follow(
     held: NDArray[np.int32],
 ) -> EmbeddedBoundary:
     """New vertices where edges of crossing faces leave the surface most, and room made for them."""
-    solid, at, images, crossings = start.solid, y, start.points, start.crossings
+    split, at, images, crossings = start.split, y, start.points, start.crossings
     fewest, since = len(crossings), 0
     while len(crossings) and since < _PATIENCE and len(at) < (1.0 + _MOST_ADDED) * len(y):
-        bad = solid.surface.F[np.unique(crossings)]
+        bad = split.solid.surface.F[np.unique(crossings)]
         edges, shares, where = _worst_edges(bad, at, target.points)
-        split = split_edges(solid, solid.boundary_vertices[edges], shares)
-        solid, where = split.solid, where[split.kept]
+        split, kept = split.split(split.solid.boundary_vertices[edges], shares)
+        surface, where = split.solid.surface, where[kept]
         at = np.concatenate([at, where])
         images = np.concatenate([images, target.points(where)])
-        at, images = _settled(solid.surface, target, at, images, held, len(where))
-        crossings = _core.certificate.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
+        at, images = _settled(surface, target, at, images, held, len(where))
+        crossings = _core.certificate.crossing_faces(images, surface.F, _MOST_PAIRS)
         since = 0 if len(crossings) < fewest else since + 1
         fewest = min(fewest, len(crossings))
-    return EmbeddedBoundary(solid, images, crossings)
+    return EmbeddedBoundary(split, images, crossings)
 
 
 def _overlay(
@@ -153,23 +153,23 @@ def _overlay(
     held: NDArray[np.int32],
 ) -> EmbeddedBoundary:
     """New vertices where crossing faces meet vertices and edges of the target; all others stay."""
-    solid, at, images, crossings = start.solid, y, start.points, start.crossings
+    split, at, images, crossings = start.split, y, start.points, start.crossings
     most = min(_MOST_PAIRS - 1, _MOST_TIMES * len(crossings))
     for _ in range(_ROUNDS):
         enough = len(crossings) > most or len(at) > (1.0 + _MOST_ADDED) * len(y)
         if enough or not len(crossings):
             break
         edges, shares, where = overlay_splits(
-            solid.surface, target, at, images, np.unique(crossings)
+            split.solid.surface, target, at, images, np.unique(crossings)
         )
         if not len(edges):
             break
-        split = split_edges(solid, solid.boundary_vertices[edges], shares)
-        solid, where = split.solid, where[split.kept]
+        split, kept = split.split(split.solid.boundary_vertices[edges], shares)
+        surface, where = split.solid.surface, where[kept]
         at = np.concatenate([at, where])
         images = np.concatenate([images, target.points(where)])
-        crossings = _core.certificate.crossing_faces(images, solid.surface.F, _MOST_PAIRS)
-    return EmbeddedBoundary(solid, images, crossings)
+        crossings = _core.certificate.crossing_faces(images, surface.F, _MOST_PAIRS)
+    return EmbeddedBoundary(split, images, crossings)
 
 
 def _settled(

@@ -29,6 +29,7 @@ from ..maps.result import MapResult
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
+from ..mesh.split_edges import SplitSolid
 from ..volume.engine import require_certified, solve
 from ..volume.options import FillOptions
 from ..volume.problem import VolumeProblem
@@ -66,7 +67,7 @@ class Registration(MapResult):
     landmark_map : str
         ``"smooth"`` or ``"affine"``.
     refinement : Refinement or None
-        Of the source with its boundary edges split.
+        Of the source, its boundary edges split first.
     boundary_splits : int
         Edges of the source's boundary that were split where it was too coarse: its image would
         cross itself, or the affine map turn a face over.
@@ -114,14 +115,16 @@ class Registration(MapResult):
             "snapped": float(snapped.max()) if snapped.size else 0.0,
             "gauge": dataclasses.asdict(self.gauge),
             "boundary_splits": self.boundary_splits,
-            "added_vertices": 0 if added is None else added.n_split,
+            "added_vertices": 0 if added is None else added.n_split - self.boundary_splits,
             "added_tets": 0 if added is None else added.n_added_tets,
         }
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
-        """The target (``target_V``, ``target_T``) and the landmarks (k, 2)."""
+        """The target (``target_V``, ``target_T``), the landmarks (k, 2), and, if the mesh was
+        refined, the input tet of each tet, ``parent_tet``."""
+        added = {} if self.refinement is None else {"parent_tet": self.refinement.parent_tet}
         pairs = np.stack([self.landmarks.source, self.landmarks.target], axis=1)
-        return {"target_V": self.target.V, "target_T": self.target.T, "landmarks": pairs}
+        return {"target_V": self.target.V, "target_T": self.target.T, "landmarks": pairs, **added}
 
 
 @takes_threads
@@ -224,7 +227,7 @@ def register(
             boundary.crossings.ravel(),
         )
     return _fill(
-        boundary, source.n_vertices, target, marks, gauge, landmark_map, history,
+        boundary, target, marks, gauge, landmark_map, history,
         FillOptions() if options is None else options, keep_best, seconds, progress,
     )  # fmt: skip
 
@@ -264,10 +267,10 @@ def _boundary_map(
     match = match_surfaces(
         first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
     )
-    y, points = match.y, match.points
+    y, points, split = match.y, match.points, SplitSolid.of(source)
     if landmark_map == "affine":
         starts, ends = y[pairs[:, 0]], second.turns[pairs[:, 1]]
-        source, y, folded = unfold_boundary(
+        split, y, folded = unfold_boundary(
             source, y, lambda at: affine_landmark_map(starts, ends, at)
         )
         if len(folded):
@@ -278,12 +281,11 @@ def _boundary_map(
             )
         points = second.points(y)
     points[pairs[:, 0]] = second.surface.V[pairs[:, 1]]
-    return embed_boundary(source, second, y, points, pairs[:, 0]), gauge, match.history
+    return embed_boundary(split, second, y, points, pairs[:, 0]), gauge, match.history
 
 
 def _fill(
     boundary: EmbeddedBoundary,
-    n_given: int,
     target: TetMesh,
     marks: Landmarks,
     gauge: Gauge,
@@ -296,10 +298,11 @@ def _fill(
 ) -> Registration:
     """The volume map with the boundary prescribed."""
     clock = time.perf_counter()
-    source, points = boundary.solid, boundary.points
+    source, points = boundary.split.solid, boundary.points
     problem = VolumeProblem.of(source, points, refine=options.refine)
     outcome = solve(problem, options, progress=progress)
-    problem, refinement = outcome.problem, outcome.problem.refinement
+    problem, refined = outcome.problem, outcome.problem.refinement
+    added = Refinement.of(boundary.split) if refined is None else refined.after(boundary.split)
     seconds = {**seconds, "volume": time.perf_counter() - clock}
     solid, converged, stop_reason = problem.solid, outcome.converged, outcome.stop_reason
     image = problem.x * problem.length + problem.center
@@ -321,8 +324,8 @@ def _fill(
         landmark_error=float(np.linalg.norm(gap, axis=1).max(initial=0.0)) / size,
         gauge=gauge,
         landmark_map=landmark_map,
-        refinement=refinement if refinement is not None and refinement.n_split else None,
-        boundary_splits=source.n_vertices - n_given,
+        refinement=added if added.n_split else None,
+        boundary_splits=boundary.split.n_split,
         history=history + outcome.history,
         certificate=certificate,
         converged=converged and certificate.certified,

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import stretchmap as sm
+from shapes import thin_wall
 from stretchmap import _core, samples
 from stretchmap.errors import (
     ArrayError,
@@ -16,7 +17,7 @@ from stretchmap.errors import (
 )
 from stretchmap.maps.points import PointMap
 from stretchmap.mesh.meshes import TetMesh, TriMesh
-from stretchmap.mesh.split_edges import split_edges
+from stretchmap.mesh.split_edges import SplitSolid, split_edges
 from stretchmap.registration import embed as _embed
 from stretchmap.registration.embed import embed_boundary, unfold_boundary
 from stretchmap.registration.flat_torus import FlatSurface, Gauge, choose_gauge
@@ -242,15 +243,6 @@ def test_saving(registered, tmp_path):
     assert "landmark error" in registered.summary()
 
 
-def thin_wall(thickness, n_tets=12_000):
-    """A short tube: the section of the solid torus pressed flat along the radius."""
-    solid = samples.solid_torus(n_tets)
-    x, y, z = solid.V.T
-    radius = np.hypot(x, y)
-    scale = (1.0 + thickness * (radius - 3.0)) / radius
-    return TetMesh(np.stack([x * scale, y * scale, z], axis=1), solid.T)
-
-
 def test_a_boundary_image_that_crosses_itself_is_refined():
     """Chords of a coarse polygon leave the thin wall on the other side."""
     source, target = samples.solid_torus(400), FlatSurface.of(thin_wall(0.02).surface)
@@ -259,8 +251,9 @@ def test_a_boundary_image_that_crosses_itself_is_refined():
     points, n = target.points(y), len(y)
     assert len(_core.certificate.crossing_faces(points, source.surface.F, 1000)) > 50
     held = np.arange(0, n, 20, dtype=np.int32)
-    result = embed_boundary(source, target, y, points, held)
-    solid, surface = result.solid, result.solid.surface
+    result = embed_boundary(SplitSolid.of(source), target, y, points, held)
+    solid = result.split.solid
+    surface = solid.surface
     assert not len(result.crossings)
     assert not len(_core.certificate.crossing_faces(result.points, surface.F, 1000))
     assert solid.n_vertices > source.n_vertices and solid.diagnose().ok
@@ -281,7 +274,8 @@ def test_faces_that_the_affine_map_turns_over_are_refined():
 
     faces = source.surface.F
     assert (flat_areas(shear(y), faces) <= 0.0).any()
-    solid, bent, folded = unfold_boundary(source, y, shear)
+    split, bent, folded = unfold_boundary(source, y, shear)
+    solid = split.solid
     assert not len(folded) and (flat_areas(bent, solid.surface.F) > 0.0).all()
     assert np.array_equal(bent[: len(y)], shear(y))
     assert solid.diagnose().ok and solid.volume == pytest.approx(source.volume, rel=1e-12)
