@@ -70,16 +70,27 @@ Jet chart_jet(const Eigen::Vector2d (&angle)[3], double tube_ratio, bool second)
   return jet;
 }
 
-// Adds weight (x + 1/x - 2), x = jet / unit. `curvature` multiplies the jet's own second
-// derivatives: 1 is exact, 0 Gauss-Newton.
-void add_barrier(const Jet& jet, double unit, double weight, double curvature, bool second,
-                 Jet& sum) {
+// Adds weight (x + 1/x - 2), x = jet / unit.
+void add_barrier(const Jet& jet, double unit, double weight, bool second, Jet& sum) {
   const double x = jet.value / unit;
   sum.value += weight * (x - 1.0) * (x - 1.0) / x;
   const double slope = weight * (1.0 - 1.0 / (x * x)) / unit;
   sum.gradient += slope * jet.gradient;
   if (!second) return;
   const double bend = weight * 2.0 / (x * x * x * unit * unit);
+  sum.hessian += bend * jet.gradient * jet.gradient.transpose() + slope * jet.hessian;
+}
+
+// Adds weight (x - 1/x)^2 / 4, x = jet / unit: grows as fast as what the standard deviation counts.
+// `curvature` multiplies the jet's own second derivatives: 1 is exact, 0 Gauss-Newton.
+void add_areas(const Jet& jet, double unit, double weight, double curvature, bool second,
+               Jet& sum) {
+  const double x = jet.value / unit, q = 1.0 / x;
+  sum.value += 0.25 * weight * (x - q) * (x - q);
+  const double slope = 0.5 * weight * (x - q * q * q) / unit;
+  sum.gradient += slope * jet.gradient;
+  if (!second) return;
+  const double bend = 0.5 * weight * (1.0 + 3.0 * q * q * q * q) / (unit * unit);
   sum.hessian += bend * jet.gradient * jet.gradient.transpose() + curvature * slope * jet.hessian;
 }
 
@@ -144,8 +155,8 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
     sum.value = std::numeric_limits<double>::infinity();
     return sum;
   }
-  add_barrier(area, scale * size, weights.area * share, curvature, second, sum);
-  if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * share, 1.0, second, sum);
+  add_areas(area, scale * size, weights.area * share, curvature, second, sum);
+  if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * share, second, sum);
   if (weights.facing > 0.0) {
     const Facing outward = facing(p, problem.torus(), second);
     if (weights.epsilon <= 0.0 && !(outward.least.value > 0.0)) {
@@ -225,7 +236,7 @@ double best_scale(const GlideProblem& problem, const Points2Ref& angles) {
   const Vec areas = glide_areas(problem, angles);
   const Eigen::ArrayXd ratio = areas.array() / problem.reference.areas.array();
   const Eigen::ArrayXd weights = problem.reference.weights.array();
-  return std::sqrt((weights * ratio).sum() / (weights / ratio).sum());
+  return std::sqrt(std::sqrt((weights * ratio.square()).sum() / (weights / ratio.square()).sum()));
 }
 
 }  // namespace stretchmap::area

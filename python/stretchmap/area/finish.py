@@ -16,6 +16,7 @@ _CHART = 1.0
 _FACING = 1.0
 _GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
+_AT_REST = "energy at rest"
 _STALLED = 3  # steps in a row without any length end the iteration
 _REST, _SLOW = 8, 0.01  # so many steps that lower the energy by less than this share end it, too
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
@@ -82,10 +83,13 @@ def finish_areas(
         if balance == 1.0 and measured.face_std <= _MARGIN * tol and _within(measured, tol):
             break
         if ended := _ended(measured, tol, taken, at_rest, shape_budget * least):
+            if ended == _AT_REST and weight < heaviest:
+                weight, at_rest = min(weight * _GROWTH, heaviest), _rest()
+                continue
             reason = ended
             break
     if balance < 1.0:
-        return history, reason == "energy at rest" and history[-1].flips == 0, reason
+        return history, reason == _AT_REST and history[-1].flips == 0, reason
     last = _weights(min(weight, _RING_WEIGHT), barrier)
     if rings and newton.project_rings(last, tol, _RATIO_GOAL * tol):
         history.append(_record("newton", len(history), None, newton.measures(), start))
@@ -123,7 +127,7 @@ def _ended(
 ) -> str:
     """Why no further step is to be taken, empty while one is."""
     if taken is not None and at_rest(taken):
-        return "no step lowers the energy" if taken.step == 0.0 else "energy at rest"
+        return "no step lowers the energy" if taken.step == 0.0 else _AT_REST
     if measured.face_std <= _FAIR * tol and measured.angle_mean > most_angle:
         return "shape budget spent"
     return ""

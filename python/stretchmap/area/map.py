@@ -126,10 +126,10 @@ def area_map(
     Notes
     -----
     The finishing solve minimises, over the angles of all vertices,
-    ``sum w [rho + 1/rho - 2 + (shape Q + chart (sigma + 1/sigma - 2)) / weight]``: w as the root of
-    a face's area, rho its area ratio in space, Q = (s1/s2 + s2/s1)/2 - 1 its angle distortion,
-    sigma its area ratio in the chart, infinite before a face turns over. The weight grows from step
-    to step.
+    ``sum w [(rho - 1/rho)^2 / 4 + (shape Q + chart (sigma + 1/sigma - 2)) / weight]``: w as the
+    root of a face's area, rho its area ratio in space, Q = (s1/s2 + s2/s1)/2 - 1 its angle
+    distortion, sigma its area ratio in the chart, infinite before a face turns over. The weight
+    grows from step to step.
 
     Examples
     --------

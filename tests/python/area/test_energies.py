@@ -196,7 +196,7 @@ def test_finishing_energy_against_a_second_computation(
     np.testing.assert_allclose(_core.testing.glide_areas(problem, angles), areas, rtol=1e-12)
     rho = areas / shares / scale
     value = _core.testing.glide_energy(problem, 1.0, 0.0, 0.0, scale, angles)[0]
-    assert value == pytest.approx((weights * (rho + 1.0 / rho - 2.0)).sum(), rel=1e-10)
+    assert value == pytest.approx((weights * 0.25 * (rho - 1.0 / rho) ** 2).sum(), rel=1e-10)
     for other in (0.99 * scale, 1.01 * scale):
         assert _core.testing.glide_energy(problem, 1.0, 0.0, 0.0, other, angles)[0] > value
     jacobians = []

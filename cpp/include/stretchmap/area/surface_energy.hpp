@@ -1,7 +1,7 @@
 // Energy of a surface glued to a torus of revolution, its vertices free to glide (two angles each),
 // measured on the polyhedral image in space:
 //
-//   sum over faces w [ area   (rho + 1/rho - 2)         rho   = |g(t)| / (scale |t|)
+//   sum over faces w [ area   (rho - 1/rho)^2 / 4       rho   = |g(t)| / (scale |t|)
 //                      + shape  ((s1/s2 + s2/s1)/2 - 1)   s     = singular values of the face's map
 //                      + chart  (sigma + 1/sigma - 2)     sigma = signed area in the (u, v) chart
 //                                                         times the torus' density at its middle,
@@ -54,7 +54,7 @@ enum class Derivatives { kNone, kHessian, kModel };
 GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                          const Points2Ref& angles, Derivatives derivatives);
 
-// \return the scale at which the area term is least: sqrt(sum (w rho) / sum (w / rho)), with
+// \return the scale at which the area term is least: (sum (w rho^2) / sum (w / rho^2))^(1/4), with
 //         rho = |g| / |t|.
 double best_scale(const GlideProblem& problem, const Points2Ref& angles);
 
