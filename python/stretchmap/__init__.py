@@ -59,10 +59,10 @@ if TYPE_CHECKING:
     from .homology.loops import HomologyBasis as HomologyBasis
     from .homology.representatives import harmonic_forms as harmonic_forms
     from .homology.representatives import holomorphic_forms as holomorphic_forms
-    from .io.read_write import read as read
-    from .io.read_write import read_solid as read_solid
-    from .io.read_write import read_surface as read_surface
-    from .io.read_write import write as write
+    from .io.reading import read as read
+    from .io.reading import read_solid as read_solid
+    from .io.reading import read_surface as read_surface
+    from .io.writing import write as write
     from .maps.files import LoadedMap as LoadedMap
     from .maps.files import load_map as load_map
     from .maps.history import IterationRecord as IterationRecord
@@ -110,10 +110,10 @@ _EXPORTS = {
     "from_pyvista": "mesh.foreign",
     "from_trimesh": "mesh.foreign",
     "tetrahedralize": "mesh.tetrahedralize",
-    "read": "io.read_write",
-    "read_solid": "io.read_write",
-    "read_surface": "io.read_write",
-    "write": "io.read_write",
+    "read": "io.reading",
+    "read_solid": "io.reading",
+    "read_surface": "io.reading",
+    "write": "io.writing",
     "HarmonicForms": "forms.harmonic",
     "HolomorphicForms": "forms.holomorphic",
     "Distortion": "measures.elements",

@@ -146,20 +146,9 @@ def area_map(
         raise OptionError("balance acts in the finishing steps: take finish='ring' or 'face'")
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
-    if basis is not None:
-        instance("basis", basis, HomologyBasis, "see homology_basis")
-    if conformal is not None:
-        instance("conformal", conformal, ConformalMap, "see conformal_map")
     clock = time.perf_counter()
     seconds: dict[str, float] = {}
-    if conformal is None:
-        conformal = conformal_map(surface, basis=basis, progress=progress)
-    require_same_mesh(
-        surface,
-        conformal.mesh,
-        "the conformal map is of another surface",
-        "pass conformal_map(surface), or leave it out",
-    )
+    conformal = _start(surface, basis, conformal, progress)
     clock = _lap(seconds, "conformal", clock)
 
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
@@ -216,6 +205,27 @@ def area_map(
         stop_reason=reason,
         seconds=seconds,
     )
+
+
+def _start(
+    surface: TriMesh,
+    basis: HomologyBasis | None,
+    conformal: ConformalMap | None,
+    progress: Progress | None,
+) -> ConformalMap:
+    """The conformal map, computed if it is not given."""
+    if basis is not None:
+        instance("basis", basis, HomologyBasis, "see homology_basis")
+    if conformal is None:
+        return conformal_map(surface, basis=basis, progress=progress)
+    instance("conformal", conformal, ConformalMap, "see conformal_map")
+    require_same_mesh(
+        surface,
+        conformal.mesh,
+        "the conformal map is of another surface",
+        "pass conformal_map(surface), or leave it out",
+    )
+    return conformal
 
 
 def finished(

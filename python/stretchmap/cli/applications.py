@@ -173,7 +173,7 @@ def partition(
     quiet: Quiet = False,
 ) -> None:
     """Cut a mapped solid into parts by volume."""
-    from ..io.read_write import suffixes
+    from ..io.formats import suffixes
     from ..partitions.parts import partition as cut
 
     common.check_outputs(output, suffixes(solid=True), json, map_file)

@@ -195,7 +195,7 @@ def check_outputs(
 
 def map_suffixes() -> tuple[str, ...]:
     """Suffixes a map can be saved with."""
-    from ..io.read_write import suffixes
+    from ..io.formats import suffixes
 
     return suffixes(solid=False)
 

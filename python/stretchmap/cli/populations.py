@@ -66,7 +66,7 @@ def population(
     run folder. Exit code 1 if shapes were skipped or the template is not at rest.
     """
     from ..base.progress import terminal
-    from ..io.read_write import write
+    from ..io.writing import write
     from ..plot.population_report import write_population_report
     from ..population.run import fit
 

@@ -1,7 +1,9 @@
 """Meshes and fields from files and into them."""
 
 from .arrays import MeshArrays
-from .read_write import read, read_arrays, read_solid, read_surface, suffixes, write
+from .formats import suffixes
+from .reading import read, read_arrays, read_solid, read_surface
+from .writing import write
 
 __all__ = [
     "MeshArrays",

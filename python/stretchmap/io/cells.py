@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -48,23 +49,7 @@ def simplices(
     FileFormatError
         There are neither, or cells of other kinds as well.
     """
-    blocks = [block for block in blocks if len(block.cells)]
-    counts: dict[str, int] = {}
-    for block in blocks:
-        counts[block.kind] = counts.get(block.kind, 0) + len(block.cells)
-    found = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    tets = [block for block in blocks if _TETS.fullmatch(block.kind)]
-    flat = [b for b in blocks if _TRIANGLES.fullmatch(b.kind) or b.kind in _POLYGONS]
-    used = tets or flat
-    if any(b not in tets and b not in flat and not _BELOW.fullmatch(b.kind) for b in blocks):
-        raise FileFormatError(
-            f"the cells are {found}; only triangles and tets can be used, split or convert the "
-            "others"
-        )
-    if not used:
-        raise FileFormatError(f"no triangles and no tets ({found or 'no cells'})")
-    if left_out := sum(counts.values()) - sum(len(block.cells) for block in used):
-        _log.info("%d of the cells left out (%s)", left_out, found)
+    tets, used = _used([block for block in blocks if len(block.cells)])
     elements, data = _elements(used, 4 if tets else 3)
     kept = _without_midpoints(used, elements, len(points))
     if kept is not None:
@@ -74,6 +59,35 @@ def simplices(
         point_data = {name: np.asarray(array)[kept] for name, array in point_data.items()}
     F, T = (None, elements) if tets else (elements, None)
     return MeshArrays(points, F=F, T=T, point_data=dict(point_data), cell_data=data)
+
+
+def _used(blocks: Sequence[Block]) -> tuple[bool, list[Block]]:
+    """Whether there are tets, and the blocks of them, or of the triangles and polygons."""
+    counts: Counter[str] = Counter()
+    of: dict[str, list[Block]] = {"tets": [], "flat": [], "below": [], "other": []}
+    for block in blocks:
+        counts[block.kind] += len(block.cells)
+        of[_class(block.kind)].append(block)
+    found = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    if of["other"]:
+        raise FileFormatError(
+            f"the cells are {found}; only triangles and tets can be used, split or convert the "
+            "others"
+        )
+    used = of["tets"] or of["flat"]
+    if not used:
+        raise FileFormatError(f"no triangles and no tets ({found or 'no cells'})")
+    if left_out := counts.total() - sum(len(block.cells) for block in used):
+        _log.info("%d of the cells left out (%s)", left_out, found)
+    return bool(of["tets"]), used
+
+
+def _class(kind: str) -> str:
+    if _TETS.fullmatch(kind):
+        return "tets"
+    if _TRIANGLES.fullmatch(kind) or kind in _POLYGONS:
+        return "flat"
+    return "below" if _BELOW.fullmatch(kind) else "other"
 
 
 def _elements(blocks: Sequence[Block], width: int) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:

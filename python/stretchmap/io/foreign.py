@@ -74,6 +74,12 @@ def read_pyvista(path: Path) -> MeshArrays:
             raise FileFormatError(f"VTK cannot read it: {said[-1] if said else 'no reason given'}")
         with open(out, "rb") as file:
             arrays = read_archive(file)
+    point_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "p:"}
+    return simplices(arrays["points"], _blocks(arrays), point_data)
+
+
+def _blocks(arrays: dict[str, NDArray[Any]]) -> list[Block]:
+    """The cells of a grid of VTK, by kind and number of corners."""
     points, offsets = arrays["points"], arrays["offsets"].astype(np.int64)
     sizes = np.diff(offsets)
     named = np.unique(arrays["cells"])
@@ -86,8 +92,7 @@ def read_pyvista(path: Path) -> MeshArrays:
         cells = arrays["cells"][offsets[rows, None] + np.arange(size)]
         data = {name: array[rows] for name, array in cell_data.items()}
         blocks.append(Block(_VTK.get(kind, f"cells of VTK's type {kind}"), cells, data))
-    point_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "p:"}
-    return simplices(points, blocks, point_data)
+    return blocks
 
 
 def run_vtk(path: Path, out: Path) -> tuple[int, str]:

@@ -6,6 +6,7 @@ import re
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import FileFormatError
 from .arrays import MeshArrays, fans, lines_of
@@ -29,15 +30,19 @@ def read_off(data: bytes) -> MeshArrays:
             raise FileFormatError(f"{n} points, {m} faces announced, {len(lines) - 1} lines follow")
         return _words_alone(rest.split(), n, m)
     points = np.loadtxt(lines[1 : 1 + n], usecols=(0, 1, 2), ndmin=2)
-    faces = lines[1 + n : 1 + n + m]
+    return MeshArrays(points, F=_faces(lines[1 + n : 1 + n + m]))
+
+
+def _faces(faces: list[str]) -> NDArray[np.int64]:
+    """Triangles (m, 3) from lines of corners with their number first."""
     sizes = np.loadtxt(faces, usecols=0, dtype=np.int64, ndmin=1)
     if (sizes == 3).all():
-        return MeshArrays(points, F=np.loadtxt(faces, usecols=(1, 2, 3), dtype=np.int64, ndmin=2))
+        return np.loadtxt(faces, usecols=(1, 2, 3), dtype=np.int64, ndmin=2)
     rows = [line.split()[1 : 1 + size] for line, size in zip(faces, sizes, strict=True)]
     if any(len(row) != size for row, size in zip(rows, sizes, strict=True)):
         raise FileFormatError("a face has fewer corners than it announces")
     corners = np.array([int(word) for row in rows for word in row], dtype=np.int64)
-    return MeshArrays(points, F=fans(corners, sizes))
+    return fans(corners, sizes)
 
 
 def _words_alone(words: list[bytes], n: int, m: int) -> MeshArrays:

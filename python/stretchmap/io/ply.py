@@ -58,7 +58,23 @@ def read_ply(data: bytes) -> MeshArrays:
 
     Polygons become triangles, each with the data of its polygon.
     """
-    order, elements, body = _header(data)
+    vertex, face = _vertices_and_faces(*_header(data))
+    corners = next((face[key] for key in _CORNERS if key in face), None)
+    if not isinstance(corners, _Lists):
+        raise FileFormatError("the faces have no list vertex_indices")
+    points = np.stack([_scalar(vertex, axis) for axis in "xyz"], axis=1)
+    cell_data = _scalars(face)
+    if (corners.sizes == 3).all():
+        faces = corners.entries.reshape(-1, 3)
+    else:
+        faces = fans(corners.entries, corners.sizes)
+        cell_data = {k: np.repeat(a, corners.sizes - 2, axis=0) for k, a in cell_data.items()}
+    point_data = {k: a for k, a in _scalars(vertex).items() if k not in "xyz"}
+    return MeshArrays(points, F=faces, point_data=point_data, cell_data=cell_data)
+
+
+def _vertices_and_faces(order: str, elements: list[_Element], body: bytes) -> tuple[_Table, _Table]:
+    """The two tables every mesh has; others are read and left."""
     tables: dict[str, _Table] = {}
     source = Bytes(body, order) if order else Words(body)
     at = 0
@@ -72,19 +88,7 @@ def read_ply(data: bytes) -> MeshArrays:
     for name in ("vertex", "face"):
         if not rows.get(name):
             raise FileFormatError(f"no element named {name}")
-    vertex, face = tables["vertex"], tables["face"]
-    corners = next((face[key] for key in _CORNERS if key in face), None)
-    if not isinstance(corners, _Lists):
-        raise FileFormatError("the faces have no list vertex_indices")
-    points = np.stack([_scalar(vertex, axis) for axis in "xyz"], axis=1)
-    cell_data = _scalars(face)
-    if (corners.sizes == 3).all():
-        faces = corners.entries.reshape(-1, 3)
-    else:
-        faces = fans(corners.entries, corners.sizes)
-        cell_data = {k: np.repeat(a, corners.sizes - 2, axis=0) for k, a in cell_data.items()}
-    point_data = {k: a for k, a in _scalars(vertex).items() if k not in "xyz"}
-    return MeshArrays(points, F=faces, point_data=point_data, cell_data=cell_data)
+    return tables["vertex"], tables["face"]
 
 
 def _scalar(table: _Table, name: str) -> NDArray[Any]:

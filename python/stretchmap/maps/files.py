@@ -15,7 +15,7 @@ from ..base.options import as_path
 from ..base.torus import Torus
 from ..errors import FileFormatError, MeshError, OptionError
 from ..io.npz import read_archive
-from ..io.read_write import read_arrays
+from ..io.reading import read_arrays
 from ..mesh.meshes import TetMesh, TriMesh
 from .fields import OF_MAPS, carried
 from .meta import read_history, read_meta

@@ -16,8 +16,9 @@ from ..base.arrays import as_reals
 from ..base.files import open_to_read
 from ..base.options import as_path
 from ..errors import ArrayError, LandmarkError, OptionError
+from ..io.formats import suffixes
 from ..io.numbers import read_numbers
-from ..io.read_write import read_solid, suffixes
+from ..io.reading import read_solid
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 

@@ -24,7 +24,7 @@ from ..base.files import atomic_path
 from ..base.tables import plain_dict
 from ..base.threads import threads
 from ..errors import LandmarkError, StretchmapError
-from ..io.read_write import read_solid
+from ..io.reading import read_solid
 from .correspondence import Along, correspond
 from .fitting import Anchors, Template
 from .shapes import Shape

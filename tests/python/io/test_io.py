@@ -19,7 +19,7 @@ from stretchmap.errors import (
     MissingDependencyError,
     NonFiniteError,
 )
-from stretchmap.io import read, read_arrays, read_solid, read_surface, write
+from stretchmap.io import read, read_arrays, read_solid, read_surface, write, writing
 from stretchmap.io.npz import save_npz
 from stretchmap.mesh.meshes import TetMesh, TriMesh
 
@@ -240,7 +240,7 @@ def test_a_failed_write_leaves_the_old_file(surface, tmp_path, monkeypatch):
         file.write(b"half")
         raise OSError("disk full")
 
-    monkeypatch.setitem(__import__("stretchmap.io.read_write").io.read_write._WRITERS, ".off", fail)
+    monkeypatch.setitem(writing._WRITERS, ".off", fail)
     with pytest.raises(OSError, match="disk full"):
         write(path, surface)
     assert path.read_text() == "precious"
