@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     from .volume.map import volume_map as volume_map
     from .volume.options import FillOptions as FillOptions
     from .volume.options import VolumeOptions as VolumeOptions
+    from .volume.own import Optimizer as Optimizer
 
 _EXPORTS = {
     "Torus": "base.torus",
@@ -148,6 +149,7 @@ _EXPORTS = {
     "VolumeMap": "volume.map",
     "VolumeOptions": "volume.options",
     "volume_map": "volume.map",
+    "Optimizer": "volume.own",
     "Landmarks": "registration.landmarks",
     "read_landmarks": "registration.landmarks",
     "Registration": "registration.map",

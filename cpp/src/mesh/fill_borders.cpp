@@ -11,10 +11,10 @@ namespace stretchmap::mesh {
 namespace {
 
 using Loop = std::vector<Index>;
-using Triple = std::array<Index, 3>;
+using Triangle = std::array<Index, 3>;
 
 constexpr std::size_t kMost = 300;  // corners of a polygon that is triangulated in one piece
-constexpr double kFlat = 1e-3;      // area over longest side squared, below which it is avoided
+constexpr double kThin = 1e-3;      // area over longest side squared, below which it is avoided
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<Loop> border_loops(const SurfaceTopology& top) {
@@ -55,7 +55,7 @@ class Filler {
   }
 
   // Triangles over the corners of a polygon; false where there is no triangulation.
-  bool fill(const Loop& polygon, std::vector<Triple>& out) {
+  bool fill(const Loop& polygon, std::vector<Triangle>& out) {
     if (poll_) poll_();
     if (polygon.size() <= kMost) return least_area(polygon, out);
     const auto [i, j] = short_diagonal(polygon);
@@ -88,7 +88,7 @@ class Filler {
     const double area = 0.5 * (b - a).cross(c - a).norm();
     const double longest =
         std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
-    return area < kFlat * longest ? area + longest : area;
+    return area < kThin * longest ? area + longest : area;
   }
 
   // Shortest diagonal that leaves at least a quarter of the corners on either side.
@@ -109,7 +109,7 @@ class Filler {
   }
 
   // Dynamic programming over the parts of the polygon between two of its corners.
-  bool least_area(const Loop& polygon, std::vector<Triple>& out) const {
+  bool least_area(const Loop& polygon, std::vector<Triangle>& out) const {
     const Index n = static_cast<Index>(polygon.size());
     Eigen::MatrixXd least = Eigen::MatrixXd::Zero(n, n);
     Eigen::Matrix<Index, Eigen::Dynamic, Eigen::Dynamic> middle(n, n);
@@ -154,7 +154,7 @@ BorderFill fill_borders(const PointsRef& points, const SurfaceTopology& top, con
   BorderFill fill;
   fill.loops = border_loops(top);
   Filler filler(points, top, poll);
-  std::vector<Triple> faces;
+  std::vector<Triangle> faces;
   std::vector<Index> hole;
   std::vector<Eigen::RowVector3d> centers;
   for (std::size_t l = 0; l < fill.loops.size(); ++l) {

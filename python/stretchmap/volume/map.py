@@ -32,6 +32,7 @@ from .boundary_starts import boundary_starts
 from .engine import require_certified, solve
 from .model import Budget
 from .options import VolumeOptions, weight_at
+from .own import Optimizer, run_optimizer
 from .problem import Outcome, VolumeProblem
 from .vsem import run_vsem
 
@@ -62,9 +63,9 @@ class VolumeMap(MapResult):
     torus : Torus
         Boundary vertices lie on it.
     method : str
-        ``"certified"`` or ``"vsem"``.
+        ``"certified"``, ``"vsem"`` or the name of an optimizer of your own.
     boundary : str
-        ``"frozen"`` or ``"glide"``.
+        ``"frozen"`` or ``"glide"``; ``"own"`` where the optimizer saw to it.
     boundary_map : AreaMap or None
         The boundary map; None if the boundary was prescribed.
     refinement : Refinement or None
@@ -133,6 +134,7 @@ def volume_map(
     balance: float | None = None,
     max_iter: int | None = None,
     start: AreaMap | VolumeMap | LoadedMap | None = None,
+    optimizer: Optimizer | None = None,
     options: VolumeOptions | None = None,
     keep_best: bool = False,
     threads: int | None = None,
@@ -163,7 +165,11 @@ def volume_map(
     max_iter : int, optional
         Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
     start : AreaMap, VolumeMap or LoadedMap, optional
-        A map of ``solid.surface`` to prescribe the boundary, or a map of ``solid`` to go on from.
+        A map of ``solid.surface`` to prescribe the boundary, or a map of ``solid``, or of its
+        refinement, to go on from.
+    optimizer : callable, optional
+        ``optimizer(solid, image, torus)`` returns a better image, see `Optimizer`: a method of your
+        own in place of ours, from the same start, measured and certified alike.
     options : VolumeOptions, optional
         All other options.
     keep_best : bool
@@ -187,6 +193,8 @@ def volume_map(
         The certified route left flipped tets or failed the certificate, ``ids`` are the elements.
     KindError
         ``start`` belongs to another mesh, or names no torus.
+    ArrayError, NonFiniteError, OrientationError
+        The optimizer returned no image, or one without positive volume.
     OptionError
         An option out of range or combined with one it excludes.
     SolverError
@@ -219,6 +227,14 @@ def volume_map(
 
     >>> sm.volume_map(solid, c=10.0, max_iter=5).history[-1].stage
     'vsem'
+
+    A method of your own:
+
+    >>> def shrink(solid, image, torus):
+    ...     return 0.5 * image  # the size does not matter
+    >>> own = sm.volume_map(solid, optimizer=shrink, keep_best=True)
+    >>> own.method, bool(abs(own.distortion.image_total / solid.volume - 1.0) < 1e-12)
+    ('shrink', True)
     """
     solid = as_solid(solid)
     if method is None:
@@ -227,6 +243,9 @@ def volume_map(
     _check_options(method, boundary, c, max_iter, options)
     if balance is not None:
         options = _balanced(method, balance, options)
+    callback("optimizer", optimizer)
+    if optimizer is not None and (method, max_iter, balance) != ("certified", None, None):
+        raise OptionError("an optimizer of your own takes no method, c, max_iter or balance")
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     if solid.n_tets > _LARGE:
@@ -243,7 +262,11 @@ def volume_map(
         options = dataclasses.replace(options, frozen_iter=max_iter, glide_iter=max_iter)
     if options.tol is not None:
         options = dataclasses.replace(options, frozen_tol=options.tol, glide_tol=options.tol)
-    result = _certified_map(solid, start, options, glide=boundary != "frozen", progress=progress)
+    if optimizer is not None:
+        result = _own_map(solid, start, options, optimizer, progress)
+    else:
+        glide = boundary != "frozen"
+        result = _certified_map(solid, start, options, glide=glide, progress=progress)
     _warn(result)
     if not keep_best:
         require_certified(result.certificate, "the map")
@@ -283,6 +306,23 @@ def _certified_map(
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
+
+
+def _own_map(
+    solid: TetMesh,
+    start: MapResult | None,
+    options: VolumeOptions,
+    optimizer: Optimizer,
+    progress: Progress | None,
+) -> VolumeMap:
+    """The map an optimizer of the user's own makes of the first start."""
+    if start is None:
+        start = next(boundary_starts(solid, options, glide=False, progress=progress))
+    image, torus = _start_of(solid, start)
+    problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
+    outcome = run_optimizer(problem, optimizer, solver=options.solver)
+    name = getattr(optimizer, "__name__", type(optimizer).__name__)
+    return _result(outcome, name, "own", start)
 
 
 def _paper_map(
@@ -362,6 +402,8 @@ def _balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOpti
 
 
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
+    if isinstance(start.mesh, TetMesh) and _refines(start.mesh, solid):
+        start = dataclasses.replace(start, mesh=solid, image=start.image[: solid.n_vertices])
     mesh = solid if isinstance(start.mesh, TetMesh) else solid.surface
     require_same_mesh(
         mesh,
@@ -372,6 +414,12 @@ def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], To
     if start.torus is None:
         raise KindError("start must be a map to a torus")
     return start.image, start.torus
+
+
+def _refines(mesh: TetMesh, solid: TetMesh) -> bool:
+    """Whether a mesh begins with the vertices of the solid and has more, as a refinement does."""
+    n = solid.n_vertices
+    return mesh.n_vertices > n and bool((mesh.V[:n] == solid.V).all())
 
 
 def _result(

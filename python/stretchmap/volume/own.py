@@ -1,0 +1,80 @@
+"""A volume map by an optimizer of the user's own: start, scale and proof are as of all others."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..base.arrays import as_reals
+from ..base.torus import Torus
+from ..errors import OrientationError
+from ..mesh.meshes import TetMesh
+from .problem import Outcome, VolumeProblem
+from .start import started
+
+__all__ = ["Optimizer", "run_optimizer"]
+
+_START_TOL = 1e-8
+
+
+class Optimizer(Protocol):
+    """What ``volume_map(optimizer=)`` calls.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> def nothing(solid, image, torus):
+    ...     return image
+    >>> solid = sm.samples.solid_torus(600)
+    >>> sm.volume_map(solid, optimizer=nothing, keep_best=True).method
+    'nothing'
+    """
+
+    def __call__(self, solid: TetMesh, image: NDArray[np.float64], torus: Torus, /) -> ArrayLike:
+        """Improve an image.
+
+        Parameters
+        ----------
+        solid : TetMesh
+            What is mapped: the input, or its refinement.
+        image : ndarray, shape (n, 3)
+            Where to start, boundary vertices on the torus; of the volume of the solid.
+        torus : Torus
+
+        Returns
+        -------
+        array_like, shape (n, 3)
+            Any size will do.
+        """
+
+
+def run_optimizer(problem: VolumeProblem, optimizer: Optimizer, *, solver: str) -> Outcome:
+    """Have the optimizer improve the harmonic start, or the whole map a warm problem holds.
+
+    Raises
+    ------
+    ArrayError, NonFiniteError
+        It returned something else than an image.
+    OrientationError
+        The image as a whole has no positive volume.
+    """
+    assert problem.torus is not None
+    clock = time.perf_counter()
+    problem = started(problem, solver=solver, tol=_START_TOL)
+    volumes = _core.mesh.tet_volumes(problem.x, problem.solid.T)
+    scale = (problem.solid.volume / float(volumes.sum())) ** (1.0 / 3.0)
+    begun = time.perf_counter()
+    found = optimizer(problem.solid, problem.x * scale, problem.torus.scaled(scale))
+    image = as_reals(found, "what the optimizer returned", (problem.solid.n_vertices, 3))
+    if not float(_core.mesh.tet_volumes(np.ascontiguousarray(image), problem.solid.T).sum()) > 0.0:
+        raise OrientationError("what the optimizer returned is inside out, or has no volume")
+    seconds = {"start": begun - clock, "optimizer": time.perf_counter() - begun}
+    return Outcome(
+        dataclasses.replace(problem, x=np.ascontiguousarray(image / scale)),
+        (), True, "the optimizer returned", seconds,
+    )  # fmt: skip
