@@ -63,9 +63,9 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     _require_all(path, file_format, sum(len(block.data) for block in mesh.cells))
     blocks = []
     for b, block in enumerate(mesh.cells):
-        data = {name: np.asarray(parts[b]) for name, parts in mesh.cell_data.items()}
+        data = {name: _native(parts[b]) for name, parts in mesh.cell_data.items()}
         blocks.append(Block(block.type, np.asarray(block.data), data))
-    point_data = {name: np.asarray(array) for name, array in mesh.point_data.items()}
+    point_data = {name: _native(array) for name, array in mesh.point_data.items()}
     return simplices(np.asarray(mesh.points), blocks, point_data)
 
 
@@ -97,6 +97,12 @@ def _require_all(path: Path, file_format: str, found: int) -> None:
         announced = sum(int(count) for count in re.findall(pattern, data))
     if announced != found:
         raise FileFormatError(f"{announced} cells are announced, {found} can be understood")
+
+
+def _native(array: Any) -> NDArray[Any]:
+    """In the machine's byte order, not the file's."""
+    array = np.asarray(array)
+    return array.astype(array.dtype.newbyteorder("="), copy=False)
 
 
 def _plain(array: NDArray[Any]) -> NDArray[Any]:

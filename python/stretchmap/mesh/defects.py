@@ -94,7 +94,13 @@ def _common(kind: str, element: str, size: str) -> dict[str, Wording]:
             f"{{}} cannot be oriented with their neighbours: the {kind} is not orientable; cut or "
             "remesh it there",
         ),
-        ("degenerate", DegenerateError, element, f"{{}} without {size}; remove or remesh them"),
+        (
+            "degenerate",
+            DegenerateError,
+            element,
+            f"{{}} without {size}; remove or remesh them, or scale "
+            "the points if all lie so close together",
+        ),
         (
             "unreferenced",
             DegenerateError,

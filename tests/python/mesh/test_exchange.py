@@ -94,6 +94,50 @@ def test_fields_of_a_map_go_along():
         grid.to_trimesh()
 
 
+def every_kind(rng, n):
+    whole = {f"{t}{b}": rng.integers(0, 100, n).astype(f"{t}{b}") for t in "iu" for b in (1, 4, 8)}
+    reals = {f"f{b}": rng.normal(size=n).astype(f"f{b}") for b in (4, 8)}
+    vectors = {f"v{t}": rng.normal(size=(n, 3)).astype(t) for t in ("f4", "f8", "i4")}
+    odd = {"least": np.full(n, 5e-324), "zero": np.full(n, -0.0), "nine": rng.normal(size=(n, 9))}
+    return whole | reals | vectors | odd
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("library", ["pyvista", "trimesh", "meshio"])
+def test_fields_of_every_kind_go_out_bit_by_bit(library, seed):
+    pytest.importorskip(library)
+    rng = np.random.default_rng(seed)
+    mesh = sm.samples.torus_surface(12, 7)
+    points, cells = every_kind(rng, mesh.n_vertices), every_kind(rng, mesh.n_faces)
+    result = sm.area_map(mesh).with_fields(points, cells)
+    out = getattr(result, f"to_{library}")()
+    if library == "trimesh":
+        found = out.vertex_attributes, out.face_attributes
+    elif library == "pyvista":
+        found = out.point_data, out.cell_data
+    else:
+        found = out.point_data, {name: parts[0] for name, parts in out.cell_data.items()}
+    for ours, theirs in zip((points, cells), found, strict=True):
+        for name, array in ours.items():
+            there = np.asarray(theirs[name])
+            assert (there.dtype, there.shape) == (array.dtype, array.shape), name
+            assert there.tobytes() == array.tobytes(), name
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".vtu", ".vtk"])
+def test_fields_of_every_kind_come_back_from_files_bit_by_bit(suffix, tmp_path):
+    pytest.importorskip("meshio")
+    rng = np.random.default_rng(3)
+    solid = sm.samples.solid_torus(500)
+    points, cells = every_kind(rng, solid.n_vertices), every_kind(rng, solid.n_tets)
+    sm.write(tmp_path / f"a{suffix}", solid, points, cells)
+    found = sm.io.read_arrays(tmp_path / f"a{suffix}")
+    for ours, theirs in ((points, found.point_data), (cells, found.cell_data)):
+        for name, array in ours.items():
+            assert theirs[name].dtype == array.dtype, name
+            assert theirs[name].tobytes() == array.tobytes(), name
+
+
 def test_other_cells_and_objects_are_refused(surface):
     pyvista = pytest.importorskip("pyvista")
     with pytest.raises(KindError, match="triangulate"):
