@@ -3,6 +3,7 @@
 
 #include "arrays.hpp"
 #include "stretchmap/volume/level_histogram.hpp"
+#include "stretchmap/volume/mesh_surface.hpp"
 #include "stretchmap/volume/rest_shape.hpp"
 #include "stretchmap/volume/ring_projection.hpp"
 #include "stretchmap/volume/solid_newton.hpp"
@@ -75,13 +76,16 @@ void bind_newton(py::module_& m) {
       .def_property_readonly("area", &GlideSurface::area);
   py::class_<TorusSurface, GlideSurface, std::shared_ptr<TorusSurface>>(m, "TorusSurface")
       .def(py::init<double, double>(), py::arg("R"), py::arg("r"));
+  py::class_<MeshSurface, GlideSurface, std::shared_ptr<MeshSurface>>(m, "MeshSurface")
+      .def(py::init<const PointsRef&, const FacesRef&>(), py::arg("points").noconvert(),
+           py::arg("faces").noconvert(), release_gil());
   py::class_<GlidingBoundary>(m, "GlidingBoundary")
       .def(py::init([](std::shared_ptr<GlideSurface> surface, Faces faces, Rows rest, Vec weights) {
              return GlidingBoundary{std::move(surface), std::move(faces), std::move(rest),
                                     std::move(weights)};
            }),
-           py::kw_only(), py::arg("surface"), py::arg("faces"), py::arg("rest"),
-           py::arg("weights"));
+           py::kw_only(), py::arg("surface"), py::arg("faces"), py::arg("rest"), py::arg("weights"))
+      .def("facing", &least_facing, py::arg("x").noconvert(), release_gil());
   py::class_<NewtonOptions>(m, "NewtonOptions")
       .def(py::init([](double tol, int max_cg, bool keep_hessian) {
              NewtonOptions options;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 namespace stretchmap::volume {
 
@@ -12,18 +13,22 @@ using Eigen::Vector3d;
 
 struct BoundaryBarrier::State {
   std::array<Vector3d, 3> x;
-  std::array<Vector3d, 4> point, normal;  // corners and centroid
-  Eigen::Matrix<double, 3, 2> G;          // J = sum_i x_i G.row(i)
+  Vector3d centroid;
+  int samples;                     // of the outward direction: at corners and centroid, or one
+  std::array<Vector3d, 4> normal;  // for all
+  double length;                   // of the sum of the corners' directions
+  Eigen::Matrix<double, 3, 2> G;   // J = sum_i x_i G.row(i)
   Eigen::Matrix<double, 3, 2> J;
   Vector3d area;        // area vector over the rest area
   double inverse_area;  // 1 / rest area
-  Eigen::Vector4d sigma;
+  std::array<double, 4> sigma;
 };
 
-BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, Index f) const {
+BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, const GlideSites& sites,
+                                              Index f) const {
   State s;
-  for (int k = 0; k < 3; ++k) s.point[k] = s.x[k] = x.row(boundary_.faces(f, k)).transpose();
-  s.point[3] = (s.x[0] + s.x[1] + s.x[2]) / 3.0;
+  for (int k = 0; k < 3; ++k) s.x[k] = x.row(boundary_.faces(f, k)).transpose();
+  s.centroid = (s.x[0] + s.x[1] + s.x[2]) / 3.0;
   const auto rest = boundary_.rest.row(f);
   s.G << 0.0, 0.0, rest[0], rest[1], rest[2], rest[3];
   s.G.row(0) = -(s.G.row(1) + s.G.row(2));
@@ -31,55 +36,72 @@ BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, Index f) const
   for (int k = 0; k < 3; ++k) s.J += s.x[k] * s.G.row(k);
   s.inverse_area = 2.0 * (rest[0] * rest[3] - rest[1] * rest[2]);
   s.area = 0.5 * s.inverse_area * (s.x[1] - s.x[0]).cross(s.x[2] - s.x[0]);
-  for (int k = 0; k < 4; ++k) {
-    s.normal[k] = surface().outward(s.point[k]);
-    s.sigma[k] = s.area.dot(s.normal[k]);
+  s.samples = surface().smooth() ? 4 : 1;
+  for (int k = 0; k < 3; ++k) s.normal[k] = sites(boundary_.faces(f, k)).outward;
+  if (s.samples == 4) {
+    // From the first corner: the centroid's closest point may lie on another sheet.
+    s.normal[3] = surface().outward(s.centroid, sites(boundary_.faces(f, 0)).place);
+  } else {
+    s.normal[0] += s.normal[1] + s.normal[2];
+    s.length = s.normal[0].norm();
+    // Of directions that cancel nothing can be said: then the face counts as folded.
+    s.normal[0] /= std::max(s.length, 1e-300);
   }
+  for (int k = 0; k < s.samples; ++k) s.sigma[k] = s.area.dot(s.normal[k]);
   return s;
 }
 
-FaceReport BoundaryBarrier::value(const PointsRef& x, Index f, double epsilon) const {
-  const State s = state(x, f);
+// Gradient by corner i of sigma_k, the area vector held: how the direction turns.
+Vector3d BoundaryBarrier::turned(const State& s, const GlideSites& sites, Index f, int k,
+                                 int i) const {
+  const GlideSite& site = sites(boundary_.faces(f, i));
+  if (s.samples == 1)
+    return site.turn.transpose() * (s.area - s.sigma[0] * s.normal[0]) / std::max(s.length, 1e-300);
+  if (k < 3) return k == i ? Vector3d(site.turn.transpose() * s.area) : Vector3d::Zero();
+  const Index place = sites(boundary_.faces(f, 0)).place;
+  return surface().outward_derivative(s.centroid, place).transpose() * s.area / 3.0;
+}
+
+FaceReport BoundaryBarrier::value(const PointsRef& x, const GlideSites& sites, Index f,
+                                  double epsilon) const {
+  const State s = state(x, sites, f);
   FaceReport report;
-  report.facing = s.sigma.minCoeff();
+  report.facing = *std::min_element(s.sigma.begin(), s.sigma.begin() + s.samples);
   if (epsilon <= 0.0 && !(report.facing > 0.0)) {
     report.energy = std::numeric_limits<double>::infinity();
     return report;
   }
   const double I = s.J.squaredNorm();
-  for (const double sigma : s.sigma)
-    report.energy += 0.5 * (I + sigma * sigma + 1.0) / regularized(sigma, epsilon).value - 2.0;
-  report.energy *= 0.25 * boundary_.weights[f];
+  for (int k = 0; k < s.samples; ++k)
+    report.energy +=
+        0.5 * (I + s.sigma[k] * s.sigma[k] + 1.0) / regularized(s.sigma[k], epsilon).value - 2.0;
+  report.energy *= boundary_.weights[f] / s.samples;
   return report;
 }
 
-void BoundaryBarrier::model(const PointsRef& x, Index f, double epsilon,
+void BoundaryBarrier::model(const PointsRef& x, const GlideSites& sites, Index f, double epsilon,
                             Eigen::Matrix<double, 6, 1>& gradient,
                             Eigen::Matrix<double, 6, 6>& hessian) const {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  const State s = state(x, f);
+  const State s = state(x, sites, f);
   std::array<Eigen::Matrix<double, 3, 2>, 3> axes;
   Matrix6 jacobian;  // of vec(J) by the six unknowns
   for (int k = 0; k < 3; ++k) {
-    axes[k] = surface().frame(s.x[k]).leftCols<2>();
+    axes[k] = sites(boundary_.faces(f, k)).frame.leftCols<2>();
     for (int c = 0; c < 2; ++c) jacobian.block<3, 2>(3 * c, 2 * k) = s.G(k, c) * axes[k];
   }
   const Eigen::Map<const Vector6> J(s.J.data());
   const Vector6 slope = jacobian.transpose() * J;  // half the gradient of |J|^2
   const Matrix6 square = jacobian.transpose() * jacobian;
-  const double I = s.J.squaredNorm(), weight = 0.25 * boundary_.weights[f];
+  const double I = s.J.squaredNorm(), weight = boundary_.weights[f] / s.samples;
 
-  for (int k = 0; k < 4; ++k) {
+  for (int k = 0; k < s.samples; ++k) {
     Vector6 d;  // gradient of sigma_k
-    // The outward direction turns with the corner it belongs to, or with the centroid.
-    const Vector3d turn = surface().outward_derivative(s.point[k]).transpose() * s.area;
     for (int i = 0; i < 3; ++i) {
-      Vector3d by_x =
+      const Vector3d by_area =
           0.5 * s.inverse_area * (s.x[(i + 1) % 3] - s.x[(i + 2) % 3]).cross(s.normal[k]);
-      if (k == i) by_x += turn;
-      if (k == 3) by_x += turn / 3.0;
-      d.segment<2>(2 * i) = axes[i].transpose() * by_x;
+      d.segment<2>(2 * i) = axes[i].transpose() * (by_area + turned(s, sites, f, k, i));
     }
 
     const double sigma = s.sigma[k], N = I + sigma * sigma + 1.0;
@@ -92,6 +114,22 @@ void BoundaryBarrier::model(const PointsRef& x, Index f, double epsilon,
                (square + d * d.transpose() - t * (slope + along) * d.transpose() -
                 t * d * (slope + along).transpose() + t * t * N * d * d.transpose());
   }
+}
+
+Vec least_facing(const GlidingBoundary& boundary, const PointsRef& x) {
+  IndexVec number = IndexVec::Constant(x.rows(), -1);
+  std::vector<Index> vertices;
+  for (const Index i : boundary.faces.reshaped()) {
+    if (number[i] >= 0) continue;
+    number[i] = static_cast<Index>(vertices.size());
+    vertices.push_back(i);
+  }
+  const GlideSites sites = sites_at(*boundary.surface, x, vertices, number, false);
+  const BoundaryBarrier barrier(boundary);
+  Vec facing(barrier.size());
+#pragma omp parallel for schedule(static)
+  for (Index f = 0; f < barrier.size(); ++f) facing[f] = barrier.value(x, sites, f, 1.0).facing;
+  return facing;
 }
 
 Rows rest_triangles(const PointsRef& V, const FacesRef& faces, double scale, double max_aspect) {

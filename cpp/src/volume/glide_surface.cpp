@@ -9,9 +9,28 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+GlideSites sites_at(const GlideSurface& surface, const PointsRef& x,
+                    const std::vector<Index>& vertices, const IndexVec& number, bool derivatives) {
+  const Index count = static_cast<Index>(vertices.size());
+  GlideSites sites{number, std::vector<GlideSite>(vertices.size())};
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < count; ++i) {
+    const Vector3d point = x.row(vertices[i]).transpose();
+    GlideSite& site = sites.at[i];
+    site.place = surface.place(point);
+    site.outward = surface.outward(point, site.place);
+    if (!derivatives) continue;
+    site.frame = surface.frame(point, site.place);
+    site.turn = surface.outward_derivative(point, site.place);
+  }
+  return sites;
+}
+
 TorusSurface::TorusSurface(double R, double r) : torus_{R, r} {}
 
-Matrix3d TorusSurface::frame(const Vector3d& x) const {
+Index TorusSurface::place(const Vector3d&) const { return -1; }
+
+Matrix3d TorusSurface::frame(const Vector3d& x, Index) const {
   const double rho = x.head<2>().norm();
   const double cu = x[0] / rho, su = x[1] / rho;
   const double v = std::atan2(x[2], rho - torus_.R);
@@ -23,12 +42,12 @@ Matrix3d TorusSurface::frame(const Vector3d& x) const {
   return Q;
 }
 
-Vector3d TorusSurface::outward(const Vector3d& x) const {
+Vector3d TorusSurface::outward(const Vector3d& x, Index) const {
   const double share = 1.0 - torus_.R / x.head<2>().norm();
   return Vector3d(share * x[0], share * x[1], x[2]).normalized();
 }
 
-Matrix3d TorusSurface::outward_derivative(const Vector3d& x) const {
+Matrix3d TorusSurface::outward_derivative(const Vector3d& x, Index) const {
   const double rho = x.head<2>().norm(), share = 1.0 - torus_.R / rho;
   const Vector3d along(-x[1] / rho, x[0] / rho, 0.0);
   const Vector3d off(share * x[0], share * x[1], x[2]);
@@ -38,7 +57,7 @@ Matrix3d TorusSurface::outward_derivative(const Vector3d& x) const {
          (Matrix3d::Identity() - torus_.R / rho * along * along.transpose());
 }
 
-Vector3d TorusSurface::moved(const Vector3d& x, const Vector2d& step) const {
+Vector3d TorusSurface::moved(const Vector3d& x, Index, const Vector2d& step) const {
   const double rho = x.head<2>().norm();
   const double u = std::atan2(x[1], x[0]) + step[0] / rho;
   const double v = std::atan2(x[2], rho - torus_.R) + step[1] / torus_.r;
@@ -47,7 +66,7 @@ Vector3d TorusSurface::moved(const Vector3d& x, const Vector2d& step) const {
 
 // Of xi along arc length: uu is -radial / rho, vv is -normal / r, uv is -sin(v) e_u / rho, radial
 // being cos(v) normal - sin(v) e_v.
-Matrix2d TorusSurface::bending(const Vector3d& x, const Vector3d& g) const {
+Matrix2d TorusSurface::bending(const Vector3d& x, Index, const Vector3d& g) const {
   const double rho = x.head<2>().norm();
   const double cv = (rho - torus_.R) / torus_.r, sv = x[2] / torus_.r;
   Matrix2d C;

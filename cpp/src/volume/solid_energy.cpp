@@ -13,11 +13,6 @@ using Eigen::RowVector3d;
 using Eigen::Vector3d;
 using Block = Eigen::Map<Block3>;
 
-// What is taken of the way to where a tet turns over, and so how far ahead that has to be looked
-// for.
-constexpr double kShare = 0.9, kWholeStep = 1.0 / kShare;
-constexpr int kHoldingPasses = 6;
-
 // Sum in blocks of fixed size: the result does not depend on the number of threads.
 double blocked_sum(const Vec& values) {
   constexpr Index kBlock = 4096;
@@ -34,25 +29,6 @@ void add_block(const Block3& block, double* to) {
   Eigen::Map<Eight> head(to);
   head += Eigen::Map<const Eight>(block.data());
   to[8] += block(2, 2);
-}
-
-// Smallest root in (0, limit] of d0 + d1 a + d2 a^2 + d3 a^3 with d0 > 0; limit if there is none.
-double first_root(double d0, double d1, double d2, double d3, double limit) {
-  const auto p = [&](double a) { return d0 + a * (d1 + a * (d2 + a * d3)); };
-  // Bernstein coefficients on [0, limit]: all positive means no root.
-  const double b1 = d0 + d1 * limit / 3.0;
-  const double b2 = d0 + 2.0 * d1 * limit / 3.0 + d2 * limit * limit / 3.0;
-  if (b1 > 0 && b2 > 0 && p(limit) > 0) return limit;
-  // March with a Lipschitz bound of the derivative: never steps over a root.
-  const double bound = std::abs(d1) + limit * (2.0 * std::abs(d2) + 3.0 * limit * std::abs(d3));
-  double a = 0.0;
-  for (int k = 0; k < 64; ++k) {
-    const double value = p(a);
-    if (value <= 1e-3 * d0) return a;
-    a += value / bound;
-    if (a >= limit) return limit;
-  }
-  return a;
 }
 
 }  // namespace
@@ -88,34 +64,44 @@ void SolidEnergy::set_targets(const VecRef& target) {
   }
 }
 
-EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
+SolidEnergy::Energies SolidEnergy::energies(const PointsRef& x, const EnergyWeights& w) const {
   const Index k = static_cast<Index>(tets_.rows());
-  Vec energy(k), det(k);
+  Energies found;
+  found.tets.resize(k);
+  found.det.resize(k);
   constexpr Index kRun = 512;
 #pragma omp parallel for schedule(static)
   for (Index run = 0; run < k; run += kRun)
     for_batches(
         x, w, run, std::min(k, run + kRun), element_values, [](Index t) { return t; },
         [&](Index t, int lane, const ElementBatch& batch) {
-          det[t] = batch.det[lane];
-          energy[t] = batch.energy[lane];
+          found.det[t] = batch.det[lane];
+          found.tets[t] = batch.energy[lane];
         });
-  EnergyReport report;
-  report.energy = blocked_sum(energy);
-  if (w.face > 0.0 && barrier_.size() > 0) {
-    Vec face(barrier_.size()), facing(barrier_.size());
+  if (!(w.face > 0.0) || barrier_.size() == 0) return found;
+  found.faces.resize(barrier_.size());
+  found.facing.resize(barrier_.size());
+  const GlideSites at = sites(x, false);
 #pragma omp parallel for schedule(static)
-    for (Index f = 0; f < barrier_.size(); ++f) {
-      const FaceReport there = barrier_.value(x, f, w.epsilon);
-      face[f] = there.energy;
-      facing[f] = there.facing;
-    }
-    report.energy += w.face * blocked_sum(face);
-    report.min_facing = facing.minCoeff();
-    report.folds = static_cast<Index>((facing.array() <= 0.0).count());
+  for (Index f = 0; f < barrier_.size(); ++f) {
+    const FaceReport there = barrier_.value(x, at, f, w.epsilon);
+    found.faces[f] = w.face * there.energy;
+    found.facing[f] = there.facing;
   }
-  report.min_det = k > 0 ? det.minCoeff() : 0.0;
-  report.flips = static_cast<Index>((det.array() <= 0.0).count());
+  return found;
+}
+
+EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
+  const Energies found = energies(x, w);
+  EnergyReport report;
+  report.energy = blocked_sum(found.tets);
+  if (found.faces.size() > 0) {
+    report.energy += blocked_sum(found.faces);
+    report.min_facing = found.facing.minCoeff();
+    report.folds = static_cast<Index>((found.facing.array() <= 0.0).count());
+  }
+  report.min_det = found.det.size() > 0 ? found.det.minCoeff() : 0.0;
+  report.flips = static_cast<Index>((found.det.array() <= 0.0).count());
   return report;
 }
 
@@ -168,22 +154,24 @@ void SolidEnergy::model(const PointsRef& x, const EnergyWeights& w, Points& grad
   }
   if ((motion_.array() != kGliding).all()) return;
   const Index n_rows = rows();
+  const GlideSites at = sites(x, true);
 #pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row) into_frames(x, row, gradient, blocks);
+  for (Index row = 0; row < n_rows; ++row) into_frames(x, at, row, gradient, blocks);
   if (w.face <= 0.0) return;
 #pragma omp parallel for schedule(static, 1)
   for (Index p = 0; p < parts; ++p) {
     for (const Index f : part_faces_[p])
-      add_face(x, w, f, part_row_[p], part_row_[p + 1], gradient, blocks);
+      add_face(x, at, w, f, part_row_[p], part_row_[p + 1], gradient, blocks);
   }
 }
 
 // Adds the boundary triangle's share to the rows in [first, last), which are in frames already.
-void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, Index first,
-                           Index last, Points& gradient, double* blocks) const {
+void SolidEnergy::add_face(const PointsRef& x, const GlideSites& sites, const EnergyWeights& w,
+                           Index f, Index first, Index last, Points& gradient,
+                           double* blocks) const {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-  barrier_.model(x, f, w.epsilon, g, H);
+  barrier_.model(x, sites, f, w.epsilon, g, H);
   for (int a = 0; a < 3; ++a) {
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;
@@ -195,29 +183,34 @@ void SolidEnergy::add_face(const PointsRef& x, const EnergyWeights& w, Index f, 
   }
 }
 
+GlideSites SolidEnergy::sites(const PointsRef& x, bool derivatives) const {
+  if (site_vertex_.empty()) return {site_number_, {}};
+  return sites_at(barrier_.surface(), x, site_vertex_, site_number_, derivatives);
+}
+
 // Axes of a vertex: Cartesian, or those of the surface it glides on.
-Matrix3d SolidEnergy::frame(const PointsRef& x, Index vertex) const {
-  if (motion_[vertex] != kGliding) return Matrix3d::Identity();
-  return barrier_.surface().frame(x.row(vertex).transpose());
+Matrix3d SolidEnergy::frame(const GlideSites& sites, Index vertex) const {
+  return motion_[vertex] == kGliding ? sites(vertex).frame : Matrix3d::Identity();
 }
 
 // Rewrites one block row in vertex frames and, for a gliding vertex, adds the surface's own second
 // derivatives (clamped to stay positive semi-definite) and removes the normal unknown.
-void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
-                              double* blocks) const {
+void SolidEnergy::into_frames(const PointsRef& x, const GlideSites& sites, Index row,
+                              Points& gradient, double* blocks) const {
   const Index vertex = row_vertex_[row];
-  const Matrix3d Q = frame(x, vertex);
+  const Matrix3d Q = frame(sites, vertex);
   const bool gliding = motion_[vertex] == kGliding;
   const Vector3d g = Q.transpose() * gradient.row(row).transpose();
   for (Index p = row_ptr_[row]; blocks && p < row_ptr_[row + 1]; ++p) {
     const Index other = row_vertex_[col_[p]];
     if (!gliding && motion_[other] != kGliding) continue;
     Block block(blocks + 9 * static_cast<std::ptrdiff_t>(p));
-    Matrix3d turned = Q.transpose() * block * frame(x, other);
+    Matrix3d turned = Q.transpose() * block * frame(sites, other);
     if (gliding) turned.row(2).setZero();
     if (motion_[other] == kGliding) turned.col(2).setZero();
     if (gliding && other == vertex) {
-      const Eigen::Matrix2d C = barrier_.surface().bending(x.row(vertex).transpose(), g);
+      const Eigen::Matrix2d C =
+          barrier_.surface().bending(x.row(vertex).transpose(), sites(vertex).place, g);
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
       eigen.computeDirect(C);
       turned.topLeftCorner<2, 2>() += eigen.eigenvectors() *
@@ -229,86 +222,6 @@ void SolidEnergy::into_frames(const PointsRef& x, Index row, Points& gradient,
   }
   gradient.row(row) = g.transpose();
   if (gliding) gradient(row, 2) = 0.0;
-}
-
-Points SolidEnergy::move(const PointsRef& x, const PointsRef& step, double alpha) const {
-  Points moved = x;
-  const Index n_rows = rows();
-#pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row) {
-    const Index i = row_vertex_[row];
-    if (motion_[i] != kGliding) {
-      moved.row(i) += alpha * step.row(row);
-      continue;
-    }
-    const Eigen::Vector2d along = alpha * step.row(row).head<2>().transpose();
-    moved.row(i) = barrier_.surface().moved(x.row(i).transpose(), along).transpose();
-  }
-  return moved;
-}
-
-Points SolidEnergy::in_space(const PointsRef& x, const PointsRef& step) const {
-  Points direction = Points::Zero(x.rows(), 3);
-  const Index n_rows = rows();
-#pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row)
-    direction.row(row_vertex_[row]) =
-        (frame(x, row_vertex_[row]) * step.row(row).transpose()).transpose();
-  return direction;
-}
-
-Vec SolidEnergy::longest_steps(const PointsRef& x, const PointsRef& direction) const {
-  const Index k = static_cast<Index>(tets_.rows());
-  Vec longest = Vec::Constant(k, kWholeStep);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
-    Matrix3d E, D;
-    for (int a = 1; a < 4; ++a) {
-      E.col(a - 1) = x.row(tets_(t, a)) - x.row(tets_(t, 0));
-      D.col(a - 1) = direction.row(tets_(t, a)) - direction.row(tets_(t, 0));
-    }
-    const double d0 = E.determinant();
-    if (!(d0 > 0.0)) continue;
-    const auto det = [](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-      return a.dot(b.cross(c));
-    };
-    const double d1 = det(D.col(0), E.col(1), E.col(2)) + det(E.col(0), D.col(1), E.col(2)) +
-                      det(E.col(0), E.col(1), D.col(2));
-    const double d2 = det(D.col(0), D.col(1), E.col(2)) + det(D.col(0), E.col(1), D.col(2)) +
-                      det(E.col(0), D.col(1), D.col(2));
-    longest[t] = first_root(d0, d1, d2, D.determinant(), kWholeStep);
-  }
-  return longest;
-}
-
-double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) const {
-  return std::min(1.0, kShare * longest_steps(x, in_space(x, step)).minCoeff());
-}
-
-Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
-  Points direction = in_space(x, step), shortened = step;
-  for (int pass = 0; pass < kHoldingPasses; ++pass) {
-    const Vec longest = longest_steps(x, direction);
-    Vec share = Vec::Ones(x.rows());
-    bool held = false;
-    for (Index t = 0; t < longest.size(); ++t) {
-      if (longest[t] >= kWholeStep) continue;
-      held = true;
-      for (int a = 0; a < 4; ++a)
-        share[tets_(t, a)] = std::min(share[tets_(t, a)], kShare * kShare * longest[t]);
-    }
-    if (!held) break;
-    direction.array().colwise() *= share.array();
-    for (Index row = 0; row < rows(); ++row) shortened.row(row) *= share[row_vertex_[row]];
-  }
-  return shortened;
-}
-
-Rows SolidEnergy::near_nullspace(const PointsRef& x) const {
-  Rows modes(3 * rows(), 3);
-  for (Index row = 0; row < rows(); ++row)
-    modes.middleRows<3>(3 * row) = frame(x, row_vertex_[row]).transpose();
-  return modes;
 }
 
 }  // namespace stretchmap::volume

@@ -16,7 +16,10 @@ constexpr double kShifts[] = {0.0, 1e-8, 1e-4, 1e-1, 10.0};
 constexpr double kRounding = 1e-12;   // a predicted decrease that is no more of the energy is none
 constexpr double kEnergyShare = 0.2;  // see SolveOptions
 constexpr int kTries = 21;            // of the line search
-constexpr double kHeldUp = 0.5;       // a shorter step is worth a look at who holds it up
+constexpr int kEasings = 6;
+constexpr double kRise = 0.01;       // of the decrease predicted, by a single element: uphill
+constexpr double kWorthwhile = 0.2;  // of the decrease predicted
+constexpr double kHeldUp = 0.5;      // a shorter step is worth a look at who holds it up
 
 // Adds a share of its mean to the diagonal of every diagonal block.
 void stiffen(BlockMatrix& A, double share) {
@@ -139,6 +142,23 @@ bool SolidNewton::descend(const NewtonOptions& options, const Poll& poll, Points
   return report.decrement > 0.0 && std::isfinite(report.decrement);
 }
 
+// If single elements go uphill: the others' whole step, theirs shortened.
+void SolidNewton::try_eased(Points& x, const Points& start, Points& direction,
+                            const EnergyWeights& w, NewtonReport& report) const {
+  Points eased = direction;
+  for (int pass = 0; pass < kEasings; ++pass) {
+    eased = energy_.eased(start, eased, w, kRise * report.decrement);
+    Points trial = energy_.move(start, eased, 1.0);
+    const EnergyReport there = energy_.value(trial, w);
+    if (!(there.energy < report.after.energy)) continue;
+    x = std::move(trial);
+    direction = eased;
+    report.after = there;
+    report.alpha = 1.0;
+    if (report.before.energy - there.energy > kWorthwhile * report.decrement) return;
+  }
+}
+
 bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights& w,
                          NewtonReport& report) {
   const Points start = x;
@@ -159,6 +179,7 @@ bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights
     if (alpha == longest) try_double_step(x, start, direction, w, report);
   }
   if (w.epsilon <= 0.0 && report.alpha < kHeldUp) try_held_back(x, start, taken, w, report);
+  if (w.face > 0.0 && report.alpha < kHeldUp) try_eased(x, start, taken, w, report);
   if (report.alpha == 0.0) return false;
   last_step_ = report.alpha * Eigen::Map<const Vec>(taken.data(), taken.size());
   return true;

@@ -73,9 +73,23 @@ SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
     rest_.row(t) = elements.rest.row(order_[t]);
     weights_[t] = elements.weights[order_[t]];
   }
+  number_sites();
   build_pattern();
   find_face_slots();
   part_rows();
+}
+
+void SolidEnergy::number_sites() {
+  std::vector<bool> on_surface(motion_.size(), false);
+  for (Index i = 0; i < motion_.size(); ++i) on_surface[i] = motion_[i] == kGliding;
+  for (Index f = 0; f < barrier_.size(); ++f)
+    for (int k = 0; k < 3; ++k) on_surface[barrier_.faces()(f, k)] = true;
+  site_number_.setConstant(motion_.size(), -1);
+  for (Index i = 0; i < motion_.size(); ++i) {
+    if (!on_surface[i]) continue;
+    site_number_[i] = static_cast<Index>(site_vertex_.size());
+    site_vertex_.push_back(i);
+  }
 }
 
 void SolidEnergy::build_pattern() {

@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.linalg
 import typing
-__all__: list[str] = ['EnergyReport', 'EnergyWeights', 'GlideSurface', 'GlidingBoundary', 'NewtonOptions', 'NewtonReport', 'RingProjection', 'RingStep', 'SolidNewton', 'TorusSurface', 'VolumetricStretch', 'level_histogram', 'level_lookup', 'rest_matrices', 'rest_triangles', 'tet_stretch_energy']
+__all__: list[str] = ['EnergyReport', 'EnergyWeights', 'GlideSurface', 'GlidingBoundary', 'MeshSurface', 'NewtonOptions', 'NewtonReport', 'RingProjection', 'RingStep', 'SolidNewton', 'TorusSurface', 'VolumetricStretch', 'level_histogram', 'level_lookup', 'rest_matrices', 'rest_triangles', 'tet_stretch_energy']
 class VolumetricStretch:
     def __init__(self, tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], fixed: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"], rest_volumes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], backend: str = 'auto') -> None:
         ...
@@ -80,8 +80,13 @@ class GlideSurface:
 class TorusSurface(GlideSurface):
     def __init__(self, R: typing.SupportsFloat | typing.SupportsIndex, r: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+class MeshSurface(GlideSurface):
+    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"]) -> None:
+        ...
 class GlidingBoundary:
     def __init__(self, *, surface: GlideSurface, faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"], rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        ...
+    def facing(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         ...
 class NewtonOptions:
     def __init__(self, *, tol: typing.SupportsFloat | typing.SupportsIndex = 0.01, max_cg: typing.SupportsInt | typing.SupportsIndex = 300, keep_hessian: bool = False) -> None:

@@ -35,6 +35,9 @@ class SurfaceTree {
   // \return the closest point.
   Foot closest(const Eigen::Vector3d& query, Index hint = 0) const;
 
+  // \return the point of one face closest to a query.
+  Foot on_face(const Eigen::Vector3d& query, Index face) const;
+
   const Points& points() const { return points_; }
   const Faces& faces() const { return faces_; }
 
@@ -45,7 +48,6 @@ class SurfaceTree {
     bool leaf;
   };
   Index build(Index first, Index last, std::vector<Eigen::Array3d>& centers);
-  Foot on_face(const Eigen::Vector3d& query, Index face) const;
 
   Points points_;
   Faces faces_;

@@ -6,11 +6,13 @@
 //
 //   phi = 1/4 sum_k [ |J|^2 / (2 chi_k) - 1 + (sigma_k^2 + 1) / (2 chi_k) - 1 ],
 //
-// with chi_k = chi(sigma_k) as in element_energy.hpp. For epsilon = 0 it is infinite as soon as a
-// triangle faces inward at one of these points: what keeps the boundary image a graph over the
-// surface. The tets alone do not see such a fold. |J|^2 / chi is convex in (J, chi), so the model
-// Hessian, which drops the curvature of sigma only, is positive semi-definite without any
-// projection.
+// or, on a surface that is not smooth at the scale of the triangles, the same with one direction
+// only, the mean of those at the corners: triangles have to cut its edges, and at a sharp one no
+// triangle faces as all its corners do. Here chi_k = chi(sigma_k) as in element_energy.hpp. For
+// epsilon = 0 it is infinite as soon as a triangle faces inward at one of these points: what keeps
+// the boundary image a graph over the surface. The tets alone do not see such a fold. |J|^2 / chi
+// is convex in (J, chi), so the model Hessian, which drops the curvature of sigma only, is positive
+// semi-definite without any projection.
 #pragma once
 
 #include <memory>
@@ -44,20 +46,27 @@ class BoundaryBarrier {
   const GlideSurface& surface() const { return *boundary_.surface; }
 
   // \param x (n, 3) vertices, those of the face on the surface.
+  // \param sites what the surface has at the vertices of the faces.
   // \return weighted energy of face f.
-  FaceReport value(const PointsRef& x, Index f, double epsilon) const;
+  FaceReport value(const PointsRef& x, const GlideSites& sites, Index f, double epsilon) const;
 
+  // \param sites with frames.
   // \param gradient,hessian what the derivatives by steps of the three vertices along the first two
   //        axes of their frames are added to.
-  void model(const PointsRef& x, Index f, double epsilon, Eigen::Matrix<double, 6, 1>& gradient,
-             Eigen::Matrix<double, 6, 6>& hessian) const;
+  void model(const PointsRef& x, const GlideSites& sites, Index f, double epsilon,
+             Eigen::Matrix<double, 6, 1>& gradient, Eigen::Matrix<double, 6, 6>& hessian) const;
 
  private:
   struct State;
-  State state(const PointsRef& x, Index f) const;
+  State state(const PointsRef& x, const GlideSites& sites, Index f) const;
+  Eigen::Vector3d turned(const State& s, const GlideSites& sites, Index f, int k, int i) const;
 
   GlidingBoundary boundary_;
 };
+
+// \param x (n, 3)
+// \return (m) the least sigma_k of each face.
+Vec least_facing(const GlidingBoundary& boundary, const PointsRef& x);
 
 // As in rest_matrices, the shape of a sliver is not to be kept: it is clamped to `max_aspect`
 // relative to the regular triangle, its area kept.

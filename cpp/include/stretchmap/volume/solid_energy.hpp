@@ -73,11 +73,20 @@ class SolidEnergy {
   //         handful of them does not hold up all others.
   Points held_back(const PointsRef& x, const PointsRef& step) const;
 
+  // Where vertices glide, a few may go uphill that the model sends down: at the edges of a mesh it
+  // knows the surface on one side only.
+  // \return the step, shortened at the vertices of those elements whose energy it raises by more
+  //         than `most`.
+  Points eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w,
+               double most) const;
+
   // \return (3 rows, 3) three translations as seen from the vertex frames.
   Rows near_nullspace(const PointsRef& x) const;
 
  private:
-  Eigen::Matrix3d frame(const PointsRef& x, Index vertex) const;
+  // What the surface has at its vertices; frames and turns only if derivatives are wanted.
+  GlideSites sites(const PointsRef& x, bool derivatives) const;
+  Eigen::Matrix3d frame(const GlideSites& sites, Index vertex) const;
   Points in_space(const PointsRef& x, const PointsRef& step) const;  // (n, 3) of a step in frames
   Vec longest_steps(const PointsRef& x, const PointsRef& direction) const;  // of every tet
   // visit(t, lane, batch) for the tets t = item(p), p in [first, last), after evaluate(batch, w).
@@ -85,15 +94,22 @@ class SolidEnergy {
   void for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
                    void (*evaluate)(ElementBatch&, const EnergyWeights&), const Item& item,
                    const Visit& visit) const;
+  struct Energies {
+    Vec tets, det;      // (k) in the sorted order
+    Vec faces, facing;  // (m), empty without a barrier
+  };
+  Energies energies(const PointsRef& x, const EnergyWeights& w) const;
+  void number_sites();
   void build_pattern();
   void find_face_slots();
   void part_rows();
   Index find_block(Index row, Index column) const;  // position in col_
   void add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
                    Points& gradient, double* blocks) const;
-  void add_face(const PointsRef& x, const EnergyWeights& w, Index f, Index first, Index last,
-                Points& gradient, double* blocks) const;
-  void into_frames(const PointsRef& x, Index row, Points& gradient, double* blocks) const;
+  void add_face(const PointsRef& x, const GlideSites& sites, const EnergyWeights& w, Index f,
+                Index first, Index last, Points& gradient, double* blocks) const;
+  void into_frames(const PointsRef& x, const GlideSites& sites, Index row, Points& gradient,
+                   double* blocks) const;
 
   Tets tets_;       // sorted by lowest row
   IndexVec order_;  // which of the tets given each of them is
@@ -102,12 +118,14 @@ class SolidEnergy {
   Vec weights_;
   Flags motion_;
   BoundaryBarrier barrier_;
-  IndexVec row_vertex_;          // vertex of each row
-  IndexVec vertex_row_;          // row of each vertex, -1 if fixed
-  IndexVec row_ptr_, col_;       // block pattern
-  IndexRows slot_;               // (k, 16) block of each pair of a tet's vertices, -1 if none
-  IndexRows face_slot_;          // (m, 9) the same of a face's vertices
-  std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
+  std::vector<Index> site_vertex_;  // vertices that glide or are corners of gliding faces
+  IndexVec site_number_;            // (n) of each of them, -1 of all others
+  IndexVec row_vertex_;             // vertex of each row
+  IndexVec vertex_row_;             // row of each vertex, -1 if fixed
+  IndexVec row_ptr_, col_;          // block pattern
+  IndexRows slot_;                  // (k, 16) block of each pair of a tet's vertices, -1 if none
+  IndexRows face_slot_;             // (m, 9) the same of a face's vertices
+  std::vector<Index> part_row_;     // rows of part p: [part_row_[p], part_row_[p + 1])
   std::vector<std::vector<Index>> part_tets_;   // tets that touch them, ascending
   std::vector<std::vector<Index>> part_faces_;  // and faces
 };

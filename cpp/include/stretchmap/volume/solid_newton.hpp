@@ -56,6 +56,9 @@ class SolidNewton {
   void try_held_back(Points& x, const Points& start, Points& direction, const EnergyWeights& w,
                      NewtonReport& report) const;
 
+  void try_eased(Points& x, const Points& start, Points& direction, const EnergyWeights& w,
+                 NewtonReport& report) const;
+
   struct Change {
     Vec step, gradient;
     double inverse;  // 1 / (step . gradient)

@@ -1,0 +1,46 @@
+// A triangle mesh to glide on.
+//
+// Vertices move on its faces. Normals are interpolated between those of its vertices (Phong), so
+// that frames turn as smoothly as on the surface that the mesh stands for; within a face they and
+// the derivatives below are smooth. A place is a face.
+#pragma once
+
+#include "stretchmap/base/incidence.hpp"
+#include "stretchmap/maps/surface_tree.hpp"
+#include "stretchmap/volume/glide_surface.hpp"
+
+namespace stretchmap::volume {
+
+class MeshSurface final : public GlideSurface {
+ public:
+  // \param points,faces (n, 3) and (m, 3), closed and oriented outward, copied.
+  // \pre m > 0, no face without area.
+  MeshSurface(const PointsRef& points, const FacesRef& faces);
+
+  // \return the face closest to a point.
+  Index place(const Eigen::Vector3d& x) const override;
+
+  // All these look for the closest point along the surface from `place` on, as long as it comes
+  // closer: another sheet of the surface is never taken, however near.
+  Eigen::Matrix3d frame(const Eigen::Vector3d& x, Index place) const override;
+  Eigen::Vector3d outward(const Eigen::Vector3d& x, Index place) const override;
+  Eigen::Matrix3d outward_derivative(const Eigen::Vector3d& x, Index place) const override;
+  Eigen::Vector3d moved(const Eigen::Vector3d& x, Index place,
+                        const Eigen::Vector2d& step) const override;
+  Eigen::Matrix2d bending(const Eigen::Vector3d& x, Index place,
+                          const Eigen::Vector3d& g) const override;
+  bool smooth() const override { return false; }
+  double area() const override { return area_; }
+
+ private:
+  maps::Foot near(const Eigen::Vector3d& x, Index place) const;
+  Eigen::Vector3d interpolated(const maps::Foot& foot) const;  // not of unit length
+
+  maps::SurfaceTree tree_;
+  Incidence<> corners_;  // at each vertex
+  Points normals_;       // (n, 3) of the vertices, by angles
+  Points face_normals_;  // (m, 3)
+  double area_ = 0.0;
+};
+
+}  // namespace stretchmap::volume
