@@ -101,8 +101,8 @@ def _require_all(path: Path, file_format: str, found: int) -> None:
 
 def _native(array: Any) -> NDArray[Any]:
     """In the machine's byte order, not the file's."""
-    array = np.asarray(array)
-    return array.astype(array.dtype.newbyteorder("="), copy=False)
+    found: NDArray[Any] = np.asarray(array)
+    return found.astype(found.dtype.newbyteorder("="), copy=False)
 
 
 def _plain(array: NDArray[Any]) -> NDArray[Any]:

@@ -129,7 +129,8 @@ def test_fields_of_every_kind_come_back_from_files_bit_by_bit(suffix, tmp_path):
     pytest.importorskip("meshio")
     rng = np.random.default_rng(3)
     solid = sm.samples.solid_torus(500)
-    points, cells = every_kind(rng, solid.n_vertices), every_kind(rng, solid.n_tets)
+    points = every_kind(rng, solid.n_vertices)
+    cells = {f"of_tets_{name}": array for name, array in every_kind(rng, solid.n_tets).items()}
     sm.write(tmp_path / f"a{suffix}", solid, points, cells)
     found = sm.io.read_arrays(tmp_path / f"a{suffix}")
     for ours, theirs in ((points, found.point_data), (cells, found.cell_data)):
