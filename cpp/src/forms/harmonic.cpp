@@ -5,27 +5,58 @@
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/linalg/spd_solver.hpp"
 
 namespace stretchmap::forms {
 namespace {
 
-// Lower triangle of the Laplacian without row and column 0.
-Eigen::SparseMatrix<double> pinned_laplacian(Index n, const EdgesRef& edges,
-                                             const VecRef& weights) {
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(weights.size() + n);
+using linalg::SpdSolver;
+
+constexpr Index kLarge = 50000;  // rows from which multigrid is faster than a factorization
+constexpr double kTol = 1e-12;
+
+// The Laplacian without row and column 0.
+SparseMatrix pinned_laplacian(Index n, const EdgesRef& edges, const VecRef& weights) {
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  entries.reserve(2 * weights.size() + n);
   Vec diagonal = Vec::Zero(n);
   for (Index e = 0; e < weights.size(); ++e) {
-    const Index i = std::min(edges(e, 0), edges(e, 1)), j = std::max(edges(e, 0), edges(e, 1));
+    const Index i = edges(e, 0), j = edges(e, 1);
     if (i == j) continue;
     diagonal[i] += weights[e];
     diagonal[j] += weights[e];
-    if (i > 0) entries.emplace_back(j - 1, i - 1, -weights[e]);
+    if (i == 0 || j == 0) continue;
+    entries.emplace_back(j - 1, i - 1, -weights[e]);
+    entries.emplace_back(i - 1, j - 1, -weights[e]);
   }
   for (Index i = 1; i < n; ++i) entries.emplace_back(i - 1, i - 1, diagonal[i]);
-  Eigen::SparseMatrix<double> matrix(n - 1, n - 1);
+  SparseMatrix matrix(n - 1, n - 1);
   matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
+}
+
+Rows solved_directly(const SparseMatrix& A, const Rows& b) {
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(A);
+  if (solver.info() != Eigen::Success) {
+    throw Error("SolverError",
+                "the surface Laplacian could not be factorized; look for degenerate faces with "
+                "diagnose()");
+  }
+  return solver.solve(b);
+}
+
+// Large systems by multigrid, unless weights that differ too much keep it from converging.
+Rows solved(const SparseMatrix& A, const Rows& b) {
+  if (A.rows() < kLarge) return solved_directly(A, b);
+  try {
+    linalg::SolveOptions options;
+    options.tol = kTol;
+    Rows x = Rows::Zero(b.rows(), b.cols());
+    SpdSolver(A, {"multigrid"}).solve(b, x, options);
+    return x;
+  } catch (const Error&) {
+    return solved_directly(A, b);
+  }
 }
 
 }  // namespace
@@ -33,14 +64,7 @@ Eigen::SparseMatrix<double> pinned_laplacian(Index n, const EdgesRef& edges,
 HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const VecRef& weights,
                                 const RowsRef& eta) {
   const Index n_edges = static_cast<Index>(edges.rows());
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(
-      pinned_laplacian(n_vertices, edges, weights));
-  if (solver.info() != Eigen::Success) {
-    throw Error("SolverError",
-                "the surface Laplacian could not be factorized; look for degenerate faces with "
-                "diagnose()");
-  }
-  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(n_vertices, eta.rows());
+  Rows divergence = Rows::Zero(n_vertices, eta.rows());
   for (Index e = 0; e < n_edges; ++e) {
     divergence.row(edges(e, 0)) += weights[e] * eta.col(e).transpose();
     divergence.row(edges(e, 1)) -= weights[e] * eta.col(e).transpose();
@@ -48,7 +72,7 @@ HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const V
   HarmonicSolution result;
   result.potentials.setZero(n_vertices, eta.rows());
   result.potentials.bottomRows(n_vertices - 1) =
-      solver.solve(divergence.bottomRows(n_vertices - 1));
+      solved(pinned_laplacian(n_vertices, edges, weights), divergence.bottomRows(n_vertices - 1));
   if (!result.potentials.allFinite()) {
     throw Error("SolverError",
                 "the harmonic forms are not finite; look for degenerate faces with diagnose()");

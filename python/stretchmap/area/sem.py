@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from typing import TYPE_CHECKING
@@ -19,6 +20,8 @@ from ..maps.history import IterationRecord
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
+
+_log = logging.getLogger("stretchmap")
 
 _EMBEDDINGS = 6
 _LEAST_WEIGHT = 1e-12
@@ -39,7 +42,11 @@ def minimize_stretch(
     taken = None
     for iteration in range(max_iter + 1):
         if iteration:
-            taken = sem.step()
+            try:
+                taken = sem.step()
+            except SolverError as error:  # areas beyond rounding; others go on from here
+                _log.info("stretch energy steps end after %d: %s", iteration - 1, error)
+                break
         measured = sem.measures()
         history.append(
             IterationRecord(

@@ -59,3 +59,31 @@ def test_a_limb_beyond_the_reach_of_numbers_is_refused_with_the_remedy():
     with pytest.raises(SolverError, match="cut the limb short") as refused:
         sm.area_map(with_limb(250))
     assert len(refused.value.ids) > 0
+
+
+def test_a_stretch_solve_that_breaks_down_ends_there(monkeypatch):
+    class Breaks:
+        def __init__(self, *arguments):
+            self.sem, self.taken = _core.area.SurfaceSem(*arguments), 0
+
+        def step(self):
+            self.taken += 1
+            if self.taken == 2:
+                raise SolverError("the matrix is not positive definite", ())
+            return self.sem.step()
+
+        def measures(self):
+            return self.sem.measures()
+
+        @property
+        def turns(self):
+            return self.sem.turns
+
+    class Core:
+        area = type("area", (), {**vars(_core.area), "SurfaceSem": Breaks})
+        forms = _core.forms
+
+    monkeypatch.setattr("stretchmap.area.sem._core", Core)
+    result = sm.area_map(sm.samples.bumpy_torus(1000).surface)
+    assert [h.iteration for h in result.history if h.stage == "sem"] == [0, 1]
+    assert result.certificate.certified

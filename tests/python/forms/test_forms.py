@@ -10,7 +10,15 @@ from scipy.sparse import coo_matrix
 
 import shapes
 import tubes
-from stretchmap import TetMesh, TriMesh, _core, harmonic_forms, holomorphic_forms, homology_basis
+from stretchmap import (
+    TetMesh,
+    TriMesh,
+    _core,
+    harmonic_forms,
+    holomorphic_forms,
+    homology_basis,
+    samples,
+)
 from stretchmap.errors import DegenerateError, OptionError
 from stretchmap.forms.harmonic import CLAMP
 
@@ -254,3 +262,12 @@ def test_clamped_weights_are_solved_for():
     assert np.abs(divergence(surface, weights, clamped.forms[0])).max() < 1e-12
     with pytest.raises(OptionError, match="weights must be"):
         harmonic_forms(surface, weights="uniform")
+
+
+def test_many_vertices_are_solved_by_multigrid_as_well_as_by_factors():
+    surface = samples.torus_surface(330, 160)  # more than 50,000 vertices
+    harmonic = harmonic_forms(surface)
+    weights = _core.forms.cotangent_weights(surface.topology, surface.V)
+    for form in harmonic.forms:
+        assert np.abs(along(surface, form).sum(axis=1)).max() < 1e-12
+        assert np.abs(divergence(surface, weights, form)).max() < 1e-9 * np.abs(form).max()

@@ -12,8 +12,8 @@ struct HarmonicSolution {
   Rows gram;        // (k, k) sum over edges of weight * form_i * form_j
 };
 
-// Solves sum_j w_ij (eta([i, j]) + h_j - h_i) = 0 for every row of `eta` (k, e): one
-// factorization of the Laplacian with vertex 0 pinned, k right-hand sides. Forms run along `edges`
+// Solves sum_j w_ij (eta([i, j]) + h_j - h_i) = 0 for every row of `eta` (k, e): the Laplacian
+// with vertex 0 pinned, factorized or, if large, preconditioned by multigrid, k right-hand sides. Forms run along `edges`
 // from the first to the second vertex.
 // \pre    connected graph, eta closed on the surface, weights (e) with a positive definite pinned
 //         Laplacian.
