@@ -47,7 +47,8 @@ Vector3d onto(const MeshSurface& mesh, const Vector3d& x) {
 // A square plate of small thickness, two triangles on either side.
 MeshSurface plate(double thickness) {
   Points points(8, 3);
-  for (Index k = 0; k < 8; ++k) points.row(k) << double(k & 1), double((k >> 1) & 1), thickness * (k >> 2);
+  for (Index k = 0; k < 8; ++k)
+    points.row(k) << double(k & 1), double((k >> 1) & 1), thickness * (k >> 2);
   Faces faces(12, 3);
   faces << 0, 3, 1, 0, 2, 3, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 7, 3, 2, 6, 7, 0, 6, 2, 0, 4, 6,
       1, 3, 7, 1, 7, 5;

@@ -14,8 +14,8 @@ struct HarmonicSolution {
 
 // Solves sum_j w_ij (eta([i, j]) + h_j - h_i) = 0 for every row of `eta` (k, e): the Laplacian
 // with vertex 0 pinned, factorized or, if large, preconditioned by multigrid, k right-hand sides.
-// Forms run along `edges` from the first to the second vertex. \pre    connected graph, eta closed
-// on the surface, weights (e) with a positive definite pinned
+// Forms run along `edges` from the first to the second vertex.
+// \pre    connected graph, eta closed on the surface, weights (e) with a positive definite pinned
 //         Laplacian.
 // \throws Error "SolverError" when the factorization breaks down.
 HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const VecRef& weights,
