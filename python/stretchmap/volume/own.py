@@ -63,13 +63,14 @@ def run_optimizer(problem: VolumeProblem, optimizer: Optimizer, *, solver: str) 
     OrientationError
         The image as a whole has no positive volume.
     """
-    assert problem.torus is not None
+    torus = problem.torus
+    assert torus is not None
     clock = time.perf_counter()
     problem = started(problem, solver=solver, tol=_START_TOL)
     volumes = _core.mesh.tet_volumes(problem.x, problem.solid.T)
     scale = (problem.solid.volume / float(volumes.sum())) ** (1.0 / 3.0)
     begun = time.perf_counter()
-    found = optimizer(problem.solid, problem.x * scale, problem.torus.scaled(scale))
+    found = optimizer(problem.solid, problem.x * scale, torus.scaled(scale))
     image = as_reals(found, "what the optimizer returned", (problem.solid.n_vertices, 3))
     if not float(_core.mesh.tet_volumes(np.ascontiguousarray(image), problem.solid.T).sum()) > 0.0:
         raise OrientationError("what the optimizer returned is inside out, or has no volume")
