@@ -11,6 +11,7 @@ include(doctest)
 doctest_discover_tests(stretchmap_tests TEST_PREFIX "cpp: " PROPERTIES LABELS cpp)
 
 if(STRETCHMAP_SANITIZE AND STRETCHMAP_PYTHON)
+  # STRETCHMAP_SLOWDOWN: limits of processor time are made for plain builds, see conftest.py.
   # The interpreter is not sanitized: the runtime has to be there before it starts, and the C++
   # library with it, or exceptions cannot be intercepted.
   set(preload "")
@@ -31,6 +32,6 @@ if(STRETCHMAP_SANITIZE AND STRETCHMAP_PYTHON)
     # Python frees nothing when it ends, so leaks are not asked for.
     set_tests_properties(
       "python: ${room}" PROPERTIES FIXTURES_REQUIRED package LABELS python ENVIRONMENT
-      "LD_PRELOAD=${preload};ASAN_OPTIONS=detect_leaks=0;PYTHONPATH=${CMAKE_BINARY_DIR}/python")
+      "LD_PRELOAD=${preload};ASAN_OPTIONS=detect_leaks=0;STRETCHMAP_SLOWDOWN=25;PYTHONPATH=${CMAKE_BINARY_DIR}/python")
   endforeach()
 endif()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from stretchmap.mesh.meshes import TetMesh, TriMesh
+from stretchmap.volume import model
 
 _ROOT = Path(__file__).resolve().parents[2]
 _MESHES = Path(os.environ.get("STRETCHMAP_MESHES", _ROOT.parent / "shared" / "meshes"))
@@ -58,6 +59,17 @@ def nothing_is_left_behind() -> Iterator[None]:
     yield
     left = sorted(map(str, _entries() - before))
     assert not left, f"left behind by a test: {', '.join(left)}"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def limits_are_those_of_a_plain_build() -> Iterator[None]:
+    """Limits of processor time times ``STRETCHMAP_SLOWDOWN``, of a build that is so much slower,
+    so that its maps end where those of a plain build do."""
+    slowdown = float(os.environ.get("STRETCHMAP_SLOWDOWN", "1"))
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("_LEAST_SECONDS", "_MARGIN"):
+            patch.setattr(model, name, slowdown * getattr(model, name))
+        yield
 
 
 @pytest.fixture(scope="session")
