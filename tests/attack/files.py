@@ -22,7 +22,7 @@ import watch
 from formats import FORMATS, NEEDS, misread, sound
 from mutation import mutant
 
-LIMIT = 60.0  # seconds for one file; VTK alone takes some to load
+LIMIT = 120.0  # seconds for one file; VTK, which takes some to load, has five of processor time
 
 
 class _Notices(logging.Handler):

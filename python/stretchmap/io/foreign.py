@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -30,9 +31,16 @@ _VTK = {
 _NOT_FOR_MESHIO = re.compile(
     rb"^DATASET[ \t]+POLYDATA\b|^[^\s#].{0,200}[ \t](?:unsigned_)?long[ \t]*\r?$", re.MULTILINE
 )
-# VTK's readers abort and write past arrays on some files: they get a process of their own.
+# VTK's readers abort on some files, write past arrays on others and do not come to an end on a few:
+# they get a process of their own, and processor time by the length of the file.
 VTK_SCRIPT = """
-import sys, numpy, pyvista
+import math, os, sys, time, numpy, pyvista
+try:
+    import resource
+    most = math.ceil(time.process_time() + 5.0 + 1e-6 * os.path.getsize(sys.argv[1]))
+    resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5))
+except ImportError:  # not on Windows
+    pass
 grid = pyvista.read(sys.argv[1])
 if isinstance(grid, pyvista.MultiBlock):
     grid = grid.combine()
@@ -70,6 +78,8 @@ def read_pyvista(path: Path) -> MeshArrays:
         out = Path(folder, "grid.npz")
         code, stderr = run_vtk(path, out)
         said = [line for line in stderr.splitlines() if line.strip()]
+        if code < 0 and signal.Signals(-code).name == "SIGXCPU":
+            raise FileFormatError("VTK does not come to an end with it")
         if code or not out.exists() or any("ERR" in line for line in said):
             raise FileFormatError(f"VTK cannot read it: {said[-1] if said else 'no reason given'}")
         with open(out, "rb") as file:

@@ -234,3 +234,16 @@ def test_surfaces_as_trimesh_exports_them(suffix, tmp_path):
     mesh.require_genus_one()
     assert (mesh.n_vertices, mesh.n_faces) == (torus.n_vertices, torus.n_faces)
     assert mesh.volume == pytest.approx(torus.volume, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_a_file_vtk_reads_for_ever_is_refused(tmp_path):
+    """A loop over components, two thousand million of them."""
+    pytest.importorskip("pyvista")
+    path = tmp_path / "a.vtp"
+    sm.samples.torus_surface(8, 6).to_pyvista().save(path)
+    text = path.read_bytes()
+    assert text.count(b'NumberOfComponents="3"') >= 1
+    path.write_bytes(text.replace(b'NumberOfComponents="3"', b'NumberOfComponents="2147483648"', 1))
+    with pytest.raises(FileFormatError, match="does not come to an end"):
+        read(path)
