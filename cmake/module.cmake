@@ -5,7 +5,9 @@ file(GLOB binding_sources CONFIGURE_DEPENDS cpp/bindings/*.cpp)
 pybind11_add_module(_core NO_EXTRAS ${binding_sources})
 target_link_libraries(_core PRIVATE stretchmap_core)
 target_compile_options(_core PRIVATE ${warnings} ${strict})
-target_precompile_headers(_core PRIVATE cpp/bindings/arrays.hpp)
+if(NOT CMAKE_UNITY_BUILD) # two units are read faster than a header is precompiled
+  target_precompile_headers(_core PRIVATE cpp/bindings/arrays.hpp)
+endif()
 if(STRETCHMAP_INPLACE)
   set_target_properties(_core PROPERTIES LIBRARY_OUTPUT_DIRECTORY
                                          "${CMAKE_SOURCE_DIR}/python/stretchmap")

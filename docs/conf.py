@@ -25,7 +25,15 @@ html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_title = f"stretchmap {release}"
 html_theme_options = {"navigation_with_keys": False, "show_prev_next": False}
-exclude_patterns = ["results.md", "robustness.md", "release.md", "gallery/*.ipynb", "gallery/*.py"]
+exclude_patterns = [
+    "results.md",
+    "robustness.md",
+    "release.md",
+    "gallery/*.ipynb",
+    "gallery/*.py",
+    "tutorials/*.ipynb",
+    "tutorials/*.py",
+]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 
@@ -35,8 +43,9 @@ numpydoc_class_members_toctree = False
 
 sphinx_gallery_conf = {
     "image_scrapers": ("gallery_figures",),
-    "examples_dirs": "../examples",
-    "gallery_dirs": "gallery",
+    "examples_dirs": ["../tutorials", "../examples"],
+    "gallery_dirs": ["tutorials", "gallery"],
+    "ignore_repr_types": r"stretchmap\.plot\.picture",  # pictures are scraped
     "filename_pattern": r"\.py$",
     "abort_on_example_error": True,
     "show_memory": False,

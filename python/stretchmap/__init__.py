@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .area.map import area_map as area_map
     from .area.result import AreaMap as AreaMap
     from .base.progress import Progress as Progress
+    from .base.progress import progress_bar as progress_bar
     from .base.threads import threads as threads
     from .base.torus import Torus as Torus
     from .certificate.checks import certify as certify
@@ -103,6 +104,7 @@ if TYPE_CHECKING:
 _EXPORTS = {
     "Torus": "base.torus",
     "Progress": "base.progress",
+    "progress_bar": "base.progress",
     "threads": "base.threads",
     "TetMesh": "mesh.solids",
     "TriMesh": "mesh.surfaces",

@@ -1,8 +1,9 @@
-"""Progress of long computations: the protocol the library calls and the bar the command line shows.
+"""Progress of long computations: the protocol the library calls, and bars to look at.
 
 A library function takes ``progress=None`` and calls :func:`report` once per outer step. What is
 called may raise :class:`stretchmap.errors.Cancelled` to stop the computation. The library itself
-never prints; :func:`terminal` makes the bar for a terminal and silence for everything else.
+never prints; :func:`progress_bar` makes a bar for a notebook or a terminal, :func:`terminal` for
+the latter alone.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html import escape
 from typing import Any, Protocol, TextIO
 
-__all__ = ["Progress", "report", "terminal", "throttled"]
+__all__ = ["Progress", "progress_bar", "report", "terminal", "throttled"]
 
 
 class Progress(Protocol):
@@ -112,6 +114,41 @@ def terminal(quiet: bool = False, stream: TextIO | None = None) -> Iterator[Prog
         bar.close()
 
 
+@contextmanager
+def progress_bar() -> Iterator[Progress | None]:
+    """A bar to hand to ``progress=``, in a notebook as in a terminal, removed at the end.
+
+    Yields
+    ------
+    Progress or None
+        None, which shows nothing, where output goes to a file or a pipe.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> with sm.progress_bar() as bar:
+    ...     result = sm.volume_map(sm.samples.solid_torus(600), progress=bar)
+    >>> result.certificate.certified
+    True
+    """
+    if not _in_notebook():
+        with terminal() as bar:
+            yield bar
+        return
+    notebook = _NotebookBar()
+    try:
+        yield throttled(notebook)
+    finally:
+        notebook.close()
+
+
+def _in_notebook() -> bool:
+    """Whether this is a kernel whose front end shows HTML."""
+    module = sys.modules.get("IPython")
+    shell = module.get_ipython() if module is not None else None
+    return shell is not None and shell.has_trait("kernel")
+
+
 def _figures(values: dict[str, float]) -> str:
     return "  ".join(
         f"{name} {int(value) if float(value).is_integer() else format(value, '.4g')}"
@@ -138,6 +175,31 @@ class _PlainBar:
         if self._width:
             self._stream.write("\r" + " " * self._width + "\r")
             self._stream.flush()
+
+
+class _NotebookBar:
+    """An HTML bar by IPython alone: those of rich and tqdm need ipywidgets in a notebook."""
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+
+    def __call__(self, stage: str, done: int, total: int, **values: float) -> None:
+        from IPython.display import HTML, display
+
+        at = f'value="{done}" max="{total}"' if total else ""
+        count = f"{done}/{total}" if total else f"{done}"
+        text = escape(f"{stage} {count}  {_figures(values)}")
+        shown = HTML(f"<progress {at}></progress> <code>{text}</code>")
+        if self._handle is None:
+            self._handle = display(shown, display_id=True)
+        else:
+            self._handle.update(shown)
+
+    def close(self) -> None:
+        if self._handle is not None:
+            from IPython.display import HTML
+
+            self._handle.update(HTML(""))
 
 
 class _RichBar:

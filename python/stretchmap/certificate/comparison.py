@@ -57,6 +57,9 @@ class Comparison(HasSummary):
     distortion: Mapping[str, Distortion]
     certificate: Mapping[str, Certificate]
 
+    def __repr__(self) -> str:
+        return f"Comparison({', '.join(self.distortion)})"
+
     def rows(self) -> dict[str, dict[str, Any]]:
         """By map the figures of the table, by their headings."""
         return {

@@ -57,6 +57,9 @@ class Certificate(HasSummary):
     quantities: dict[str, float]
     ids: dict[str, tuple[int, ...]]
 
+    def __repr__(self) -> str:
+        return f"Certificate({'certified' if self.certified else f'not certified: {self.reason}'})"
+
     def to_dict(self) -> dict[str, Any]:
         """Everything, JSON-compatible."""
         return plain_dict(self.__dict__)

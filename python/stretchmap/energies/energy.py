@@ -46,6 +46,10 @@ class ElementDerivatives:
     gradients: NDArray[np.float64] | None
     hessians: NDArray[np.float64] | None
 
+    def __repr__(self) -> str:
+        order = 0 if self.gradients is None else 1 if self.hessians is None else 2
+        return f"ElementDerivatives({len(self.values)} elements, order {order})"
+
 
 class Energy(ABC):
     """An energy that is a sum over the elements of a mesh; base of the others.
@@ -65,6 +69,9 @@ class Energy(ABC):
     """
 
     mesh: TriMesh | TetMesh
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.mesh!r})"
 
     @abstractmethod
     def _evaluate(self, image: NDArray[np.float64], order: int) -> Any:

@@ -65,6 +65,9 @@ class HarmonicForms:
     n_negative: int
     n_flips: int = 0
 
+    def __repr__(self) -> str:
+        return f"HarmonicForms({len(self.forms)} forms on {self.forms.shape[1]} edges)"
+
 
 def solve_harmonic(
     surface: TriMesh, eta: NDArray[np.int32], weights: Weights = "cotangent"

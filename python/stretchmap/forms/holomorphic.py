@@ -45,3 +45,6 @@ class HolomorphicForms:
     coefficients: NDArray[np.float64]
     star: NDArray[np.float64]
     wedge: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return f"HolomorphicForms({len(self.real)} forms on {self.real.shape[1]} edges)"

@@ -80,6 +80,9 @@ class HomologyBasis(HasSummary):
     harmonic: HarmonicForms = field(repr=False)
     _torus_classes: NDArray[np.int64] | None = None
 
+    def __repr__(self) -> str:
+        return f"HomologyBasis(genus {self.genus}, {len(self.generators)} generators)"
+
     @property
     def torus_classes(self) -> NDArray[np.int64]:
         """(2, 2) classes of longitude and meridian over ``generators``; the longitude least skew.

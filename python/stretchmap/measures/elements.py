@@ -103,6 +103,12 @@ class Distortion(HasSummary):
     angles: NDArray[np.float64] = field(repr=False)
     flipped: NDArray[np.intp] = field(repr=False)
 
+    def __repr__(self) -> str:
+        flips = "unknown" if self.flips is None else self.flips
+        return (
+            f"Distortion(flips {flips}, std {self.element_std:.4g}, ring std {self.ring_std:.4g})"
+        )
+
     def report(self) -> dict[str, float | int | None]:
         """What the report of a map says of it."""
         names = (

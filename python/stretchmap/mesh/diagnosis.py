@@ -104,6 +104,10 @@ class Diagnosis(HasSummary):
     border_edges: Ids = field(default_factory=lambda: _none(0, 2))
     cavity_vertices: Ids = field(default_factory=lambda: _none(0))
 
+    def __repr__(self) -> str:
+        found = _count(len(self.defects), "defect") if self.defects else "no defects"
+        return f"Diagnosis({self.kind}, {self._genus_text()}, {found})"
+
     @property
     def n_components(self) -> int:
         """Number of components (elements that share a vertex belong together)."""

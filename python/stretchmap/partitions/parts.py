@@ -98,6 +98,9 @@ class Partition(HasSummary, Exchanged):
     uncorrected_errors: NDArray[np.float64]
     cumulative_errors: NDArray[np.float64]
 
+    def __repr__(self) -> str:
+        return f"Partition({self.n_parts} parts by {', '.join(self.by)})"
+
     @property
     def n_parts(self) -> int:
         """Number of parts."""

@@ -70,6 +70,9 @@ class Morph(HasSummary):
     flips: NDArray[np.intp]
     fields: Cells = field(repr=False)
 
+    def __repr__(self) -> str:
+        return f"Morph({len(self.times)} frames of {self.solid!r})"
+
     def frame(self, i: int) -> NDArray[np.float64]:
         """(n, 3) vertices of frame i.
 

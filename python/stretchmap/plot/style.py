@@ -33,15 +33,12 @@ def empty_figure(width: float, height: float) -> Figure:
         matplotlib is not installed.
     """
     try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
+        from .picture import Picture
     except ImportError as error:
         raise MissingDependencyError(
             "pictures need matplotlib: pip install 'stretchmap[plot]'"
         ) from error
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+    return Picture(width, height)
 
 
 def boundary(result: MapResult) -> tuple[TriMesh, Array]:

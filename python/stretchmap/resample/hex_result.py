@@ -91,6 +91,9 @@ class HexMesh(HasSummary, Exchanged):
     moved: float
     boundary_moved: float
 
+    def __repr__(self) -> str:
+        return f"HexMesh({len(self.V)} points, {len(self.H)} hexahedra)"
+
     @cached_property
     def scaled_jacobians(self) -> NDArray[np.float64]:
         """The least of the eight of each hexahedron, (k,)."""

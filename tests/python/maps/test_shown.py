@@ -21,6 +21,24 @@ def test_the_interpreter_shows_one_short_line(result):
     assert len(shown) < 100 and len(repr(sm.conformal_map(result.mesh.surface))) < 100
 
 
+def test_every_result_is_one_short_line(result):
+    solid, surface = result.mesh, result.mesh.surface
+    energy = sm.energies.VolumeStretch(solid)
+    everything = (
+        *(solid, surface, result, result.certificate, result.distortion, result.torus),
+        *(sm.partition(result, 3), sm.homology_basis(surface, solid), solid.diagnose()),
+        *(sm.compare(solid, {"here": result}), sm.hex_mesh(result, sections=12), sm.morph(result)),
+        *(sm.harmonic_forms(surface), sm.holomorphic_forms(surface)),
+        *(energy, energy.elements(solid.V, 0)),
+    )
+    for item in everything:
+        shown = repr(item)
+        assert shown.startswith(type(item).__name__ + "(") and "\n" not in shown
+        assert len(shown) < 100, shown
+    assert repr(result.certificate) == "Certificate(certified)"
+    assert "not certified: " in repr(sm.certify(solid, -solid.V))
+
+
 def test_notebooks_show_tables(result):
     parts = sm.partition(result, 3)
     basis = sm.homology_basis(result.mesh.surface)
