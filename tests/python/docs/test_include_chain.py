@@ -18,7 +18,9 @@ CHAIN = (
     {"resample"},
 )
 LEVEL = {room: level for level, rooms in enumerate(CHAIN) for room in rooms}
-INCLUDE = re.compile(r'^\s*#\s*include\s+"(?:stretchmap/)?([^"]+)"', re.MULTILINE)
+INCLUDE = re.compile(
+    r'^\s*#\s*include\s+(?:"(?:stretchmap/)?|<stretchmap/)([^">]+)[">]', re.MULTILINE
+)
 
 
 def sources(folder: Path) -> list[Path]:
