@@ -93,10 +93,14 @@ def finish_areas(
     last = _weights(min(weight, _RING_WEIGHT), barrier)
     if rings and newton.project_rings(last, tol, _RATIO_GOAL * tol):
         history.append(_record("newton", len(history), None, newton.measures(), start))
-    measured = newton.measures()
+    return history, *_verdict(newton.measures(), tol, reason)
+
+
+def _verdict(measured: _core.area.SurfaceMeasures, tol: float, reason: str) -> tuple[bool, str]:
+    """Whether the areas are good enough, and why the steps ended."""
     if measured.flips == 0 and _within(measured, tol):
-        return history, True, "areas within tol"
-    return history, False, f"{reason}{_shortfall(measured)}, tol {tol:.2e}"
+        return True, "areas within tol"
+    return False, f"{reason}{_shortfall(measured)}, tol {tol:.2e}"
 
 
 def _rest() -> Callable[[_core.area.NewtonStep], bool]:

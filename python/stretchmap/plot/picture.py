@@ -12,7 +12,7 @@ __all__ = ["Picture"]
 _DPI = 100
 
 
-class Picture(Figure):
+class Picture(Figure):  # type: ignore[misc]  # a Figure is Any to mypy, which skips the types of matplotlib
     """A figure that belongs to no window and shows itself in a notebook."""
 
     def __init__(self, width: float, height: float) -> None:

@@ -143,16 +143,7 @@ def _keep(run: _Run, x: NDArray[np.float64], glide: bool, otherwise: str) -> boo
 def _untangle(run: _Run, *, glide: bool) -> int:
     """Inverted tets, and tets at folded faces, that are left."""
     history = run.history
-    run.x = untangle_whole(history.model, run.x, history, glide=False).x
-    stuck = _patched(run, glide=False)
-    if len(stuck):
-        before = run.problem
-        run.x = untangle_whole(history.model, run.x, history, glide=False, thorough=True).x
-        left = _patched(run, glide=False)
-        if len(left) > len(stuck):
-            run.take(before)
-        else:
-            stuck = left
+    stuck = _untangle_inside(run)
     if glide:
         run.x = untangle_whole(history.model, run.x, history, glide=True).x
         stuck = _patched(run, glide=True)
@@ -184,6 +175,22 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     if not away.left and not len(stuck_tets(history.model, away.x, glide=glide)):
         run.x = away.x
     return 0
+
+
+def _untangle_inside(run: _Run) -> NDArray[np.intp]:
+    """All tets, then patches, and where that does not do, both more thoroughly; tets left."""
+    history = run.history
+    run.x = untangle_whole(history.model, run.x, history, glide=False).x
+    stuck = _patched(run, glide=False)
+    if not len(stuck):
+        return stuck
+    before = run.problem
+    run.x = untangle_whole(history.model, run.x, history, glide=False, thorough=True).x
+    left = _patched(run, glide=False)
+    if len(left) > len(stuck):
+        run.take(before)
+        return stuck
+    return left
 
 
 def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
