@@ -15,6 +15,10 @@ void bind(py::module_& m) {
         release_gil());
   m.def("scaled_jacobians", &scaled_jacobians, py::arg("points").noconvert(),
         py::arg("hexes").noconvert(), release_gil());
+  m.def("corner_sides", &corner_sides, py::arg("points").noconvert(), py::arg("hexes").noconvert(),
+        release_gil());
+  m.def("least_edge_jacobians", &least_edge_jacobians, py::arg("points").noconvert(),
+        py::arg("hexes").noconvert(), release_gil());
   m.def("hex_volumes", &hex_volumes, py::arg("points").noconvert(), py::arg("hexes").noconvert(),
         release_gil());
 
@@ -46,10 +50,10 @@ void bind(py::module_& m) {
            release_gil())
       .def(
           "set_rest",
-          [](HexNewton& self, const RowsRef& sides, const VecRef& weights) {
-            self.energy().set_rest(sides, weights);
-          },
-          py::arg("sides").noconvert(), py::arg("weights").noconvert(), release_gil())
+          [](HexNewton& self, const Eigen::Ref<const Rows24>& sides, const VecRef& weights,
+             Flags guarded) { self.energy().set_rest(sides, weights, std::move(guarded)); },
+          py::arg("sides").noconvert(), py::arg("weights").noconvert(), py::arg("guarded"),
+          release_gil())
       .def(
           "set_fit",
           [](HexNewton& self, const FitSamples& samples, const VecRef& factor) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "stretchmap/base/incidence.hpp"
 #include "stretchmap/base/parallel.hpp"
@@ -16,29 +17,14 @@ using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Block = Eigen::Map<RowMatrix3d>;
 using volume::ElementBatch;
 
-// Directions (0, 1, 2) of the edges from each corner to its three neighbors.
-constexpr int kDirection[8][3] = {{0, 1, 2}, {1, 0, 2}, {0, 1, 2}, {1, 0, 2},
-                                  {1, 0, 2}, {0, 1, 2}, {1, 0, 2}, {0, 1, 2}};
-
-// Which corners have a tet in common: all but the ends of the four long diagonals.
-std::array<std::array<bool, 8>, 8> coupled_corners() {
-  std::array<std::array<bool, 8>, 8> out{};
-  for (const auto& tet : kCorners)
-    for (const int a : tet)
-      for (const int b : tet) out[a][b] = true;
-  return out;
-}
-
 }  // namespace
 
 HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
   const Index k = static_cast<Index>(hexes_.rows());
   const Incidence<> corners = corners_at(hexes_, n);
-  const auto coupled = coupled_corners();
   const linalg::Pattern pattern = linalg::build_pattern(n, n, [&](Index i, linalg::RowSet& row) {
     for (const Index corner : corners[i])
-      for (int b = 0; b < 8; ++b)
-        if (coupled[corner % 8][b]) row.add(hexes_(corner / 8, b));
+      for (int b = 0; b < 8; ++b) row.add(hexes_(corner / 8, b));
   });
   row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n + 1);
   col_ = Eigen::Map<const IndexVec>(pattern.col.data(), row_ptr_[n]);
@@ -46,8 +32,7 @@ HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
   for_chunks(k, [&](Index begin, Index end) {
     for (Index h = begin; h < end; ++h)
       for (int a = 0; a < 8; ++a)
-        for (int b = 0; b < 8; ++b)
-          if (coupled[a][b]) slot_(h, 8 * a + b) = find_block(hexes_(h, a), hexes_(h, b));
+        for (int b = 0; b < 8; ++b) slot_(h, 8 * a + b) = find_block(hexes_(h, a), hexes_(h, b));
   });
   part_hexes_.resize(chunk_count(n));
   for_chunks(n, [&](Index begin, Index end) {
@@ -58,9 +43,11 @@ HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
   });
 }
 
-void HexEnergy::set_rest(const RowsRef& sides, const VecRef& weights) {
+void HexEnergy::set_rest(const Eigen::Ref<const Rows24>& sides, const VecRef& weights,
+                         Flags guarded) {
   inverse_ = sides.array().inverse();
   weights_ = weights / 8.0;
+  guarded_ = std::move(guarded);
 }
 
 void HexEnergy::set_fit(FitSamples samples, const VecRef& factor) {
@@ -82,16 +69,19 @@ Index HexEnergy::find_block(Index row, Index column) const {
                             col_.data());
 }
 
-void HexEnergy::load(const PointsRef& x, Index h, ElementBatch& batch) const {
-  static_assert(volume::kLanes == 8, "one lane for each corner");
+void HexEnergy::load(const PointsRef& x, Index h, int part, ElementBatch& batch) const {
+  static_assert(volume::kLanes == 8, "eight triples a batch");
   for (int c = 0; c < 8; ++c) {
-    const double* origin = x.data() + 3 * static_cast<std::ptrdiff_t>(hexes_(h, c));
+    const EdgeTriple& triple = edge_triples()[8 * part + c];
+    const double* origin = x.data() + 3 * static_cast<std::ptrdiff_t>(hexes_(h, triple.corner[0]));
     for (int a = 0; a < 3; ++a) {
-      const double* end = x.data() + 3 * static_cast<std::ptrdiff_t>(hexes_(h, kCorners[c][a + 1]));
+      const double* end =
+          x.data() + 3 * static_cast<std::ptrdiff_t>(hexes_(h, triple.corner[a + 1]));
       for (int i = 0; i < 3; ++i) batch.edges[3 * a + i][c] = end[i] - origin[i];
       for (int b = 0; b < 3; ++b) batch.rest[3 * a + b][c] = 0.0;
-      batch.rest[3 * a + a][c] = inverse_(h, kDirection[c][a]);
+      batch.rest[3 * a + a][c] = inverse_(h, triple.side[a]);
     }
+    if (triple.far > 0) batch.rest[triple.far][c] = -inverse_(h, triple.side[triple.far]);
     batch.weight[c] = 1.0;
   }
 }
@@ -110,16 +100,19 @@ HexReport HexEnergy::value(const PointsRef& x, const HexWeights& w) const {
   const double energy = sum_chunks<1>(k, [&](Index begin, Index end, std::array<double, 1>& sums) {
     ElementBatch batch;
     for (Index h = begin; h < end; ++h) {
-      load(x, h, batch);
-      element_values(batch, w.corner);
-      double sum = 0.0;
-      least[h] = *std::min_element(batch.det, batch.det + 8);
+      least[h] = std::numeric_limits<double>::infinity();
       flips[h] = 0;
-      for (int c = 0; c < 8; ++c) {
-        sum += (std::pow(1.0 + batch.energy[c], w.power) - 1.0) / w.power;
-        flips[h] += !(batch.det[c] > 0.0);
+      for (int part = 0; part < batches(h); ++part) {
+        load(x, h, part, batch);
+        element_values(batch, w.corner);
+        least[h] = std::min(least[h], *std::min_element(batch.det, batch.det + 8));
+        double sum = 0.0;
+        for (int c = 0; c < 8; ++c) {
+          sum += (std::pow(1.0 + batch.energy[c], w.power) - 1.0) / w.power;
+          flips[h] += !(batch.det[c] > 0.0);
+        }
+        sums[0] += weight(h, part) * sum;
       }
-      sums[0] += weights_[h] * sum;
     }
   })[0];
   const double fit = sum_chunks<1>(static_cast<Index>(factor_.size()),
@@ -133,11 +126,11 @@ HexReport HexEnergy::value(const PointsRef& x, const HexWeights& w) const {
 }
 
 // Adds the share of a hexahedron to the rows in [first, last).
-void HexEnergy::add(const ElementBatch& batch, double power, Index h, Index first, Index last,
-                    Points& gradient, double* blocks) const {
+void HexEnergy::add(const ElementBatch& batch, double power, Index h, int part, Index first,
+                    Index last, Points& gradient, double* blocks) const {
   for (int c = 0; c < 8; ++c) {
     const double base = 1.0 + batch.energy[c];
-    const double slope = weights_[h] * std::pow(base, power - 1.0);
+    const double slope = weight(h, part) * std::pow(base, power - 1.0);
     const double curvature = (power - 1.0) / base * slope;
     RowVector3d g[4];
     g[0].setZero();
@@ -147,14 +140,15 @@ void HexEnergy::add(const ElementBatch& batch, double power, Index h, Index firs
     }
     volume::Block3 H[4][4];
     volume::tet_blocks(batch, c, slope, H);
+    const std::array<int, 4>& corners = edge_triples()[8 * part + c].corner;
     for (int a = 0; a < 4; ++a) {
-      const int corner = kCorners[c][a];
+      const int corner = corners[a];
       const Index row = hexes_(h, corner);
       if (row < first || row >= last) continue;
       gradient.row(row) += slope * g[a];
       for (int b = 0; b < 4; ++b) {
         if (curvature > 0.0) H[a][b] += curvature * g[a].transpose() * g[b];
-        const Index slot = slot_(h, 8 * corner + kCorners[c][b]);
+        const Index slot = slot_(h, 8 * corner + corners[b]);
         Block(blocks + 9 * static_cast<std::ptrdiff_t>(slot)) += H[a][b];
       }
     }
@@ -169,9 +163,11 @@ void HexEnergy::model(const PointsRef& x, const HexWeights& w, Points& gradient,
   for_chunks(n_, [&](Index begin, Index end) {
     ElementBatch batch;
     for (const Index h : part_hexes_[begin / kChunk]) {
-      load(x, h, batch);
-      element_models(batch, w.corner);
-      add(batch, w.power, h, begin, end, gradient, blocks);
+      for (int part = 0; part < batches(h); ++part) {
+        load(x, h, part, batch);
+        element_models(batch, w.corner);
+        add(batch, w.power, h, part, begin, end, gradient, blocks);
+      }
     }
   });
   add_fit(x, gradient, blocks);

@@ -120,7 +120,43 @@ bool positive(const Coefficients& whole, double bound) {
   return true;
 }
 
+int slot_of(int corner, int neighbor) {
+  for (int a = 0; a < 3; ++a)
+    if (kCorners[corner][a + 1] == neighbor) return 3 * corner + a;
+  return -1;
+}
+
+// Corner of the face with the corners a, o, b that is not one of them.
+int across(int a, int o, int b) {
+  for (int i = 1; i < 4; ++i)
+    for (int j = 1; j < 4; ++j)
+      if (kCorners[a][i] == kCorners[b][j] && kCorners[a][i] != o) return kCorners[a][i];
+  return -1;
+}
+
+std::array<EdgeTriple, 32> make_edge_triples() {
+  std::array<EdgeTriple, 32> out;
+  int at = 8;
+  for (int a = 0; a < 8; ++a) {
+    const auto& c = kCorners[a];
+    out[a] = {c, {3 * a, 3 * a + 1, 3 * a + 2}, 0};
+    for (int i = 0; i < 3; ++i) {
+      const int b = c[i + 1], second = c[(i + 1) % 3 + 1], third = c[(i + 2) % 3 + 1];
+      if (b < a) continue;
+      const int q = across(b, a, second), p = across(b, a, third);
+      out[at++] = {{a, b, second, p}, {slot_of(a, b), slot_of(a, second), slot_of(b, p)}, 2};
+      out[at++] = {{a, b, q, third}, {slot_of(a, b), slot_of(b, q), slot_of(a, third)}, 1};
+    }
+  }
+  return out;
+}
+
 }  // namespace
+
+const std::array<EdgeTriple, 32>& edge_triples() {
+  static const std::array<EdgeTriple, 32> triples = make_edge_triples();
+  return triples;
+}
 
 Coefficients jacobian_coefficients(const Corners& x) {
   Coefficients b;
@@ -168,6 +204,37 @@ Rows8 scaled_jacobians(const PointsRef& points, const HexesRef& hexes) {
                      d = x[kCorners[c][3]] - x[c];
       const double lengths = a.norm() * b.norm() * d.norm();
       out(h, c) = lengths > 0.0 ? det(a, b, d) / lengths : 0.0;
+    }
+  }
+  return out;
+}
+
+Rows24 corner_sides(const PointsRef& points, const HexesRef& hexes) {
+  const Index k = static_cast<Index>(hexes.rows());
+  Rows24 out(k, 24);
+#pragma omp parallel for schedule(static)
+  for (Index h = 0; h < k; ++h)
+    for (int c = 0; c < 8; ++c)
+      for (int a = 0; a < 3; ++a)
+        out(h, 3 * c + a) =
+            (points.row(hexes(h, kCorners[c][a + 1])) - points.row(hexes(h, c))).norm();
+  return out;
+}
+
+Vec least_edge_jacobians(const PointsRef& points, const HexesRef& hexes) {
+  const Index k = static_cast<Index>(hexes.rows());
+  const auto& triples = edge_triples();
+  Vec out(k);
+#pragma omp parallel for schedule(static)
+  for (Index h = 0; h < k; ++h) {
+    const Corners x = corners_of(points, hexes, h);
+    out[h] = 1.0;
+    for (int t = 8; t < 32; ++t) {
+      const auto& [c, side, far] = triples[t];
+      const Vector3d a = x[c[1]] - x[c[0]], b = x[c[2]] - x[far == 1 ? c[1] : c[0]],
+                     d = x[c[3]] - x[far == 2 ? c[1] : c[0]];
+      const double lengths = a.norm() * b.norm() * d.norm();
+      out[h] = std::min(out[h], lengths > 0.0 ? det(a, b, d) / lengths : 0.0);
     }
   }
   return out;

@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.volume
 import typing
-__all__: list[str] = ['BoundaryFit', 'FitSamples', 'HexNewton', 'HexNewtonReport', 'HexReport', 'hex_volumes', 'jacobian_coefficients', 'scaled_jacobians', 'valid_hexes']
+__all__: list[str] = ['BoundaryFit', 'FitSamples', 'HexNewton', 'HexNewtonReport', 'HexReport', 'corner_sides', 'hex_volumes', 'jacobian_coefficients', 'least_edge_jacobians', 'scaled_jacobians', 'valid_hexes']
 class FitSamples:
     @property
     def distance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -56,16 +56,20 @@ class HexNewton:
         ...
     def set_fit(self, samples: FitSamples, factor: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> None:
         ...
-    def set_rest(self, sides: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> None:
+    def set_rest(self, sides: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 24]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], guarded: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8, "[m, 1]"]) -> None:
         ...
     def value(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], corner: stretchmap._core.volume.EnergyWeights, power: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> HexReport:
         ...
+def corner_sides(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], hexes: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 8]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 24]"]:
+    ...
 def hex_volumes(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], hexes: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 8]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...
 def jacobian_coefficients(corners: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[8, 3]"]) -> typing.Annotated[list[float], "FixedSize(27)"]:
     """
     Of one hexahedron, for checks.
     """
+def least_edge_jacobians(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], hexes: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 8]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    ...
 def scaled_jacobians(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], hexes: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 8]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 8]"]:
     ...
 def valid_hexes(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], hexes: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 8]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"]:

@@ -35,7 +35,8 @@ _BISECTIONS = 40
 _MOST = 100_000  # hexahedra in any direction
 _BYTES_PER_HEX = 6000  # at the peak
 _COARSE = 16_000  # hexahedra that are optimized at once
-_FINER = Schedule(powers=(2.0, 2.0, 3.0))  # of a grid that was split in eight
+# Of a grid that was split in eight: smaller quads fit better.
+_FINER = Schedule(fit=3.0, powers=(2.0,) * 2 + (3.0,) * 2 + (4.0,) * 2 + (6.0,) * 3 + (8.0,) * 3)
 
 
 def hex_mesh(

@@ -1,12 +1,13 @@
 """Hexahedra of good shape whose boundary fits the surface of the solid.
 
 The energy of the grid (`hex_energy.hpp`) has two parts: the distortion of every corner against a
-box with the mean sides of the hexahedra round it, and squared distances between the grid's boundary
-and the surface, seen from both. The boundary glides along the surface at no cost and lies about it,
-now outside, now inside, so that the volume comes out right; points held on a curved surface would
-enclose less than it does. First corners that are not positive are turned by a regularized energy
-(Garanzha et al., ACM TOG 40(4), 2021), then a barrier keeps them while the worst count more and
-more.
+box with its own sides, so that angles count and sizes hardly do, and squared distances between the
+grid's boundary and the surface, seen from both. The boundary glides along the surface at no cost
+and lies about it, now outside, now inside, so that the volume comes out right; points held on a
+curved surface would enclose less than it does. First corners that are not positive are turned by a
+regularized energy (Garanzha et al., ACM TOG 40(4), 2021), then a barrier keeps them while the worst
+count more and more. Hexahedra that could turn over between corners are guarded by further triples
+of their edges.
 """
 
 from __future__ import annotations
@@ -19,21 +20,24 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress, report
 from ..mesh.meshes import TriMesh
-from .quality import EDGES, boundary_quads, vertex_normals
+from .quality import DIRECTIONS, EDGES, boundary_quads, vertex_normals
 
 __all__ = ["GridOptimizer", "Schedule"]
 
 _VOLUME_WEIGHT = 0.1
 _LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
 _STEPS = 3  # Newton steps between two looks at boxes and samples
-_SMOOTHING = 5  # rounds that the logarithms of the boxes' sides are averaged
+_SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
+_MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
+_GUARD = 0.3  # hexahedra whose edge triples are all better are judged by their corners alone
 _PER_SIDE = 3  # samples of a quad, squared
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
 _TOLERANCE = 0.005  # of the diagonal: larger gaps count more and more ...
-_MOST_BOOST = 30.0  # ... up to this
+_MOST_BOOST = 100.0  # ... up to this
 _LOOSER = 0.6  # factor of the fit where it is in the way
 _HARDER = 2.0  # factor of the weight of a hexahedron each time it is found invalid
+_REPAIRS = 10
 _INVALID_ROUNDS = 12
 
 
@@ -45,12 +49,17 @@ class Schedule:
     ----------
     untangle : int
         Most rounds until all corners are positive.
+    fit : float
+        Factor of the fit of the boundary.
     powers : tuple of float
         Power p of each round after that, see `hex_energy.hpp`.
     """
 
     untangle: int = 40
-    powers: tuple[float, ...] = (1.0,) * 8 + (1.5,) * 4 + (2.0,) * 4 + (3.0,) * 6
+    fit: float = 1.0
+    powers: tuple[float, ...] = (
+        (1.0,) * 6 + (2.0,) * 5 + (3.0,) * 5 + (4.0,) * 5 + (6.0,) * 8 + (8.0,) * 8
+    )
 
 
 class GridOptimizer:
@@ -82,9 +91,10 @@ class GridOptimizer:
         self._strength = _FIT * len(quads) / surface.area
         self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
         self._weights = np.full(len(H), 1.0 / len(H))
+        self._guarded = np.zeros(len(H), bool)
 
     def run(self, schedule: Schedule, progress: Progress | None = None) -> None:
-        """All stages; stops early where corners cannot be made positive.
+        """All stages; stops early where hexahedra cannot be made positive.
 
         Raises
         ------
@@ -93,11 +103,9 @@ class GridOptimizer:
         """
         if not self._untangle(schedule.untangle, progress):
             return
-        done, total = 0, len(schedule.powers)
-        for power in schedule.powers:
-            report(progress, "optimize", done, total, power=power)
-            self._round(power)
-            done += 1
+        for done, power in enumerate(schedule.powers):
+            report(progress, "optimize", done, len(schedule.powers), power=power)
+            self._round(power, schedule.fit)
         for done in range(_INVALID_ROUNDS):
             invalid = _core.resample.valid_hexes(self.V, self.H) == 0
             report(progress, "validity", done, _INVALID_ROUNDS, invalid=int(invalid.sum()))
@@ -106,11 +114,11 @@ class GridOptimizer:
             # Harder on these, and the boundary gives way.
             self._weights[invalid] *= _HARDER
             self._prepare(_LOOSER ** (done + 1), 0.0)
-            self._step(0.0, schedule.powers[-1])
+            self._step(schedule.powers[-1])
 
     def _untangle(self, rounds: int, progress: Progress | None) -> bool:
-        """Whether all corners are positive."""
-        strength, least = _LOOSE, len(self.V) * 8
+        """Whether all edge triples are positive."""
+        strength, least = _LOOSE, len(self.H) * 32
         for done in range(rounds + 1):
             self._prepare(strength, 0.0)
             start = self._newton.value(self.V, _corner(1.0))
@@ -122,27 +130,48 @@ class GridOptimizer:
                 strength *= _LOOSER
             least = min(least, start.flips)
             if done < rounds:
-                size = 0.5 * abs(start.min_det)
-                self._step(float(np.clip(size, _LEAST_EPSILON, _LARGEST_EPSILON)), 1.0)
+                self._regularized(start.min_det)
         return False
 
-    def _round(self, power: float) -> None:
+    def _round(self, power: float, fit: float) -> None:
         # What the shape gains in weight, the fit gains, too.
-        self._prepare(np.sqrt(power), _MOST_BOOST)
-        self._step(0.0, power)
+        self._prepare(fit * np.sqrt(power), _MOST_BOOST)
+        self._step(power)
 
-    def _step(self, epsilon: float, power: float) -> None:
-        self.V, _ = self._newton.run(self.V, _corner(epsilon), power, _STEPS)
+    def _step(self, power: float) -> None:
+        """Newton steps, after regularized ones if triples guarded from now on are not positive."""
+        for _ in range(_REPAIRS):
+            min_det = self._newton.value(self.V, _corner(1.0)).min_det
+            if min_det > 0.0:
+                break
+            self._regularized(min_det)
+        else:
+            return
+        self.V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS)
+
+    def _regularized(self, min_det: float) -> None:
+        epsilon = float(np.clip(-0.5 * min_det, _LEAST_EPSILON, _LARGEST_EPSILON))
+        self.V, _ = self._newton.run(self.V, _corner(epsilon), 1.0, _STEPS)
 
     def _prepare(self, strength: float, boost: float) -> None:
         """Boxes and samples of the boundary for the present points."""
-        self._newton.set_rest(self._sides(), self._weights)
+        self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
+        self._newton.set_rest(self._sides(_MEAN), self._weights, self._guarded)
         samples = self._fit.match(self.V)
         factor = 1.0 + np.minimum((samples.distance / self._tolerance) ** 2, boost)
         self._newton.set_fit(samples, strength * self._strength * samples.share * factor)
 
-    def _sides(self) -> NDArray[np.float64]:
-        """(k, 3) mean lengths of parallel edges, smoothed over the hexahedra round each point."""
+    def _sides(self, mean: float) -> NDArray[np.float64]:
+        """(k, 24) sides of the corners' boxes: their own edges, or a share of local means."""
+        own = _core.resample.corner_sides(self.V, self.H)
+        logs = np.log(np.maximum(own, 1e-12 * own.max()))
+        if mean > 0.0:
+            logs += mean * (self._mean_sides()[:, DIRECTIONS.ravel()] - logs)
+        return np.ascontiguousarray(np.exp(logs))
+
+    def _mean_sides(self) -> NDArray[np.float64]:
+        """(k, 3) logarithms of mean lengths of parallel edges, smoothed over the hexahedra round
+        each point."""
         ends = self.V[self.H[:, EDGES]]  # (k, 3, 4, 2, 3)
         lengths = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1).mean(axis=-1)
         logs = np.log(np.maximum(lengths, 1e-12 * lengths.max()))
@@ -150,7 +179,7 @@ class GridOptimizer:
         for _ in range(_SMOOTHING):
             sums = [np.bincount(corners, np.repeat(column, 8)) for column in logs.T]
             logs = (np.stack(sums, axis=1) / self._counts[:, None])[self.H].mean(axis=1)
-        return np.ascontiguousarray(np.exp(logs))
+        return np.asarray(logs)
 
 
 def _corner(epsilon: float) -> _core.volume.EnergyWeights:

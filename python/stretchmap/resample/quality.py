@@ -25,6 +25,9 @@ EDGES = np.array(
      [[0, 4], [1, 5], [2, 6], [3, 7]]]
 )  # fmt: skip
 
+# Directions of the edges from each corner to its three neighbors, in the order of the core.
+DIRECTIONS = np.array([[0, 1, 2], [1, 0, 2], [0, 1, 2], [1, 0, 2]] + [[1, 0, 2], [0, 1, 2]] * 2)
+
 
 def vertex_normals(surface: TriMesh) -> NDArray[np.float64]:
     """(n, 3) unit normals, means of the faces' weighted by their angles."""

@@ -31,12 +31,16 @@ def a_fit(H):
     return _core.resample.BoundaryFit(surface.V, surface.F, normals, faces, weights, quads, 2)
 
 
-@pytest.mark.parametrize(("epsilon", "power"), [(0.0, 1.0), (0.0, 2.5), (0.2, 1.0)])
-def test_gradient_and_hessian_are_those_of_the_value(epsilon, power):
+@pytest.mark.parametrize(
+    ("epsilon", "power", "guarded"),
+    [(0.0, 1.0, False), (0.0, 2.5, True), (0.2, 1.0, True), (0.2, 1.0, False)],
+)
+def test_gradient_and_hessian_are_those_of_the_value(epsilon, power, guarded):
     H, V = a_grid(0.02)
     newton = _core.resample.HexNewton(H, len(V))
     rng = np.random.default_rng(2)
-    newton.set_rest(rng.uniform(0.5, 1.5, (len(H), 3)), rng.uniform(0.5, 1.5, len(H)))
+    sides, weights = rng.uniform(0.5, 1.5, (len(H), 24)), rng.uniform(0.5, 1.5, len(H))
+    newton.set_rest(sides, weights, np.full(len(H), guarded))
     samples_ = a_fit(H).match(V)
     newton.set_fit(samples_, rng.uniform(1.0, 2.0, len(samples_.share)))
     corner = _core.volume.EnergyWeights(1.0, 0.2, epsilon)
@@ -68,8 +72,7 @@ def test_samples_lie_on_both_surfaces():
 def test_newton_steps_untangle_and_never_raise_the_energy():
     H, V = a_grid(0.15)
     newton = _core.resample.HexNewton(H, len(V))
-    edges = np.full((len(H), 3), 0.6)
-    newton.set_rest(edges, np.ones(len(H)))
+    newton.set_rest(np.full((len(H), 24), 0.6), np.ones(len(H)), np.ones(len(H), bool))
     barrier = _core.volume.EnergyWeights(1.0, 1.0, 0.0)
     assert newton.value(V, barrier).flips > 0
     with pytest.raises(SolverError, match="not positive"):
@@ -81,3 +84,38 @@ def test_newton_steps_untangle_and_never_raise_the_energy():
     V, last = newton.run(V, barrier, 2.0, 10)
     assert last.after.energy < last.before.energy and last.after.min_det > 0.0
     assert _core.resample.scaled_jacobians(V, H).min() > 0.3
+
+
+def test_a_box_whose_edges_are_those_of_the_grid_costs_its_angles_alone():
+    """psi + 1 is then the scaled Jacobian to the power -2/3, however the edges are stretched."""
+    H, V = a_grid(0.02)
+    V = V * [1.0, 2.0, 0.3]
+    newton = _core.resample.HexNewton(H, len(V))
+    sides = _core.resample.corner_sides(V, H)
+    newton.set_rest(sides, np.ones(len(H)), np.zeros(len(H), bool))
+    newton.set_fit(a_fit(H).match(V), np.zeros(0))
+    shape_only = _core.volume.EnergyWeights(1.0, 0.0, 0.0)
+    quality = _core.resample.scaled_jacobians(V, H)
+    assert newton.value(V, shape_only, 1.5).energy == pytest.approx(
+        ((1.0 / quality - 1.0) / 1.5).mean(axis=1).sum()
+    )
+
+
+def test_edge_triples_bound_the_coefficients_between_corners():
+    """The coefficients in the middle of edges are means of two triples each."""
+    cube = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+    )
+    one = np.arange(8, dtype=np.int32)[None]
+    assert _core.resample.least_edge_jacobians(1.0 * cube, one)[0] == pytest.approx(1.0)
+    rng, caught = np.random.default_rng(6), 0
+    middle = [9 * i + 3 * j + k for i in range(3) for j in range(3) for k in range(3)
+              if (i == 1) + (j == 1) + (k == 1) == 1]  # fmt: skip
+    for _ in range(500):
+        corners = cube + 0.4 * rng.standard_normal((8, 3))
+        net = np.array(_core.resample.jacobian_coefficients(corners))
+        least = _core.resample.least_edge_jacobians(corners, one)[0]
+        if net[middle].min() <= 0.0:
+            caught += 1
+            assert least <= 0.0
+    assert caught > 50

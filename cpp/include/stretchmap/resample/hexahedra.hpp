@@ -14,6 +14,7 @@ namespace stretchmap::resample {
 using Hexes = Eigen::Matrix<Index, Eigen::Dynamic, 8, Eigen::RowMajor>;
 using HexesRef = Eigen::Ref<const Hexes>;
 using Rows8 = Eigen::Matrix<double, Eigen::Dynamic, 8, Eigen::RowMajor>;
+using Rows24 = Eigen::Matrix<double, Eigen::Dynamic, 24, Eigen::RowMajor>;
 
 // Of each corner: itself and its three neighbors, positively oriented in a right hexahedron.
 inline constexpr std::array<std::array<int, 4>, 8> kCorners = {{{0, 1, 3, 4},
@@ -24,6 +25,19 @@ inline constexpr std::array<std::array<int, 4>, 8> kCorners = {{{0, 1, 3, 4},
                                                                 {5, 4, 6, 1},
                                                                 {6, 5, 7, 2},
                                                                 {7, 6, 4, 3}}};
+
+// Three edges of a hexahedron, one of each direction, as the tet (x0, x1, x2, x3) whose determinant
+// is theirs.
+struct EdgeTriple {
+  std::array<int, 4> corner{};
+  std::array<int, 3> side{};  // columns of corner_sides
+  int far = 0;                // the edge, 1 or 2, that starts at x1 and not at x0; 0: none
+};
+
+// First the eight corners with their own three edges, then for each of the twelve edges AB the two
+// with one further edge at A and the other at B. The mean of those two determinants is the
+// coefficient below in the middle of AB.
+const std::array<EdgeTriple, 32>& edge_triples();
 
 // Coefficients of det dx/d(xi, eta, zeta) in the Bernstein polynomials of degree (2, 2, 2), the one
 // of B_i(xi) B_j(eta) B_k(zeta) at 9 i + 3 j + k. The determinant is between the least and the
@@ -48,6 +62,12 @@ Flags valid_hexes(const PointsRef& points, const HexesRef& hexes);
 // an
 //         edge has no length.
 Rows8 scaled_jacobians(const PointsRef& points, const HexesRef& hexes);
+
+// \return (k, 24) lengths of the edges from each corner to its three neighbors in kCorners.
+Rows24 corner_sides(const PointsRef& points, const HexesRef& hexes);
+
+// \return (k) the least determinant of the last 24 edge triples over the product of their lengths.
+Vec least_edge_jacobians(const PointsRef& points, const HexesRef& hexes);
 
 // \return (k) volumes of the trilinear hexahedra.
 Vec hex_volumes(const PointsRef& points, const HexesRef& hexes);
