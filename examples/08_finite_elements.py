@@ -33,7 +33,7 @@ from skfem.utils import solver_iter_pcg
 import stretchmap as sm
 from stretchmap import plot
 
-solid = sm.samples.vertebra_like(1_000)
+solid = sm.samples.bumpy_torus(1_000)
 result = sm.volume_map(solid, balance=0.5)
 
 # %%
@@ -76,7 +76,7 @@ fine = heat(tets.refined(1), ElementTetP2())
 runs = {"tets": [], "hexahedra": []}
 for mesh in (tets, tets.refined(1), tets.refined(2)):
     runs["tets"].append((mesh, *heat(mesh, ElementTetP1())))
-for count in (150, 600, 2_400):
+for count in (200, 800, 2_400):
     grid = sm.hex_mesh(result, n_hexahedra=count)
     assert grid.n_invalid == 0
     mesh = from_meshio(grid.to_meshio())
@@ -96,7 +96,7 @@ figure = Figure(figsize=(12, 4), layout="constrained")
 limit = np.abs(fine[0]).max()
 for place, (name, found) in enumerate(runs.items(), 1):
     mesh, temperature = found[1][:2]
-    axes = figure.add_subplot(1, 3, place, projection="3d", aspect="equal")
+    axes = figure.add_subplot(1, 3, place, projection="3d")
     # scikit-fem's quads go round their corners.
     corners = mesh.facets[:, mesh.boundary_facets()]
     shades = matplotlib.colormaps["RdBu_r"](0.5 + 0.5 * temperature[corners].mean(axis=0) / limit)
@@ -106,6 +106,7 @@ for place, (name, found) in enumerate(runs.items(), 1):
     low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_title(f"{mesh.nelements} {name}")
+    axes.set_box_aspect(high - low)
     axes.set_axis_off()
 axes = figure.add_subplot(1, 3, 3)
 for name, found in runs.items():

@@ -18,6 +18,7 @@ _OUTPUT = {
     "05_morph_and_transfer": "morph.pvd",
     "06_compare_methods": "comparison.png",
     "07_population": "population.npz",
+    "08_finite_elements": "energies.png",
 }
 
 
