@@ -5,8 +5,12 @@ file(GLOB binding_sources CONFIGURE_DEPENDS cpp/bindings/*.cpp)
 pybind11_add_module(_core NO_EXTRAS ${binding_sources})
 target_link_libraries(_core PRIVATE stretchmap_core)
 target_compile_options(_core PRIVATE ${warnings} ${strict})
-if(NOT CMAKE_UNITY_BUILD) # two units are read faster than a header is precompiled
+if(NOT CMAKE_UNITY_BUILD)
   target_precompile_headers(_core PRIVATE cpp/bindings/arrays.hpp)
+elseif(NOT MSVC)
+  # Two units are read faster than a header is precompiled, and to optimize what only converts would
+  # take most of the time of an install.
+  target_compile_options(_core PRIVATE -O1)
 endif()
 if(STRETCHMAP_INPLACE)
   set_target_properties(_core PROPERTIES LIBRARY_OUTPUT_DIRECTORY

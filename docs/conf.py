@@ -45,7 +45,7 @@ sphinx_gallery_conf = {
     "image_scrapers": ("gallery_figures",),
     "examples_dirs": ["../tutorials", "../examples"],
     "gallery_dirs": ["tutorials", "gallery"],
-    "ignore_repr_types": r"stretchmap\.plot\.picture",  # pictures are scraped
+    "ignore_repr_types": r"stretchmap\.plot\.figure",  # pictures are scraped
     "filename_pattern": r"\.py$",
     "abort_on_example_error": True,
     "show_memory": False,

@@ -118,9 +118,9 @@ def terminal(quiet: bool = False, stream: TextIO | None = None) -> Iterator[Prog
 def progress_bar() -> Iterator[Progress | None]:
     """A bar to hand to ``progress=``, in a notebook as in a terminal, removed at the end.
 
-    Yields
-    ------
-    Progress or None
+    Returns
+    -------
+    context manager of Progress or None
         None, which shows nothing, where output goes to a file or a pipe.
 
     Examples

@@ -1,12 +1,13 @@
 """Scenes of maps in three dimensions, by the optional package PyVista.
 
 Every function returns a ``pyvista.Plotter`` that has not been shown: call ``show()`` to turn it
-about with the mouse, or `save` for a picture. `stretchmap.plot` draws these and more by matplotlib
-alone.
+about with the mouse, `widget` for the same in a notebook, or `save` for a picture.
+`stretchmap.plot` draws these and more by matplotlib alone.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.files import atomic_path
 from ..base.options import as_path, one_of
-from ..errors import FileFormatError, MissingDependencyError
+from ..errors import FileFormatError, MissingDependencyError, OptionError
 from ..maps.given import as_map_of_solid
 from ..maps.result import MapResult
 from ..mesh.given import as_mesh
@@ -26,7 +27,7 @@ from .style import principal
 if TYPE_CHECKING:
     import pyvista
 
-__all__ = ["cut", "loops", "save"]
+__all__ = ["cut", "loops", "save", "widget"]
 
 _COLORS = {"coordinate": ("viridis", None), "ratio": ("cividis", (0.5, 1.5))}
 
@@ -161,6 +162,36 @@ def save(plotter: pyvista.Plotter, path: str | os.PathLike[str]) -> None:
     with atomic_path(path) as temporary:
         plotter.screenshot(str(temporary))
     plotter.close()
+
+
+def widget(plotter: pyvista.Plotter) -> Any:
+    """A scene as a notebook shows it: turned about by the mouse where that is possible.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+
+    Returns
+    -------
+    object
+        To end a cell with. A widget that needs no server where trame, trame-vtk and ipywidgets are
+        installed (``pip install 'pyvista[jupyter]'``), else a picture.
+
+    Raises
+    ------
+    OptionError
+        This is no notebook: call ``plotter.show()``.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> from stretchmap.plot import scene
+    >>> scene.widget(scene.loops(sm.samples.double_torus()))  # doctest: +SKIP
+    """
+    if not plotter.notebook:
+        raise OptionError("widgets are for notebooks; elsewhere call show() of the scene")
+    found = all(importlib.util.find_spec(name) for name in ("trame", "trame_vtk", "ipywidgets"))
+    return plotter.show(jupyter_backend="html" if found else "static", return_viewer=True)
 
 
 def _ring(pv: Any, points: NDArray[np.float64]) -> Any:

@@ -33,7 +33,7 @@ def empty_figure(width: float, height: float) -> Figure:
         matplotlib is not installed.
     """
     try:
-        from .picture import Picture
+        from .figure import Picture
     except ImportError as error:
         raise MissingDependencyError(
             "pictures need matplotlib: pip install 'stretchmap[plot]'"

@@ -58,6 +58,8 @@ def test_names_of_a_user_do_not_become_markup():
 
 def test_a_map_draws_itself(result):
     pytest.importorskip("matplotlib")
-    assert result.plot("ratios").axes
+    for kind in ("ratios", "convergence"):  # one after the other: no module may take a name over
+        drawn = result.plot(kind)
+        assert drawn.axes and drawn._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(OptionError, match="kind must be"):
         result.plot("portrait")

@@ -69,3 +69,23 @@ def test_wrong_requests_are_refused(area, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(MissingDependencyError, match=r"stretchmap\[viz\]"):
         scene.cut(solid)
+
+
+def test_a_notebook_shows_a_scene(tmp_path):
+    drawn("scene.save(scene.loops(samples.double_torus()), 'x.png')", tmp_path)  # or skips
+    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    pytest.importorskip("ipykernel")
+    cell = f"{_IMPORTS}\nscene.widget(scene.loops(samples.double_torus()))"
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell)])
+    nbclient.NotebookClient(notebook, timeout=60).execute()
+    (shown,) = (out.data for out in notebook.cells[0].outputs if "data" in out)
+    assert {"image/png", "text/html"} & set(shown)
+
+
+def test_elsewhere_a_widget_is_refused(tmp_path):
+    drawn(
+        "try:\n    scene.widget(scene.loops(samples.double_torus()))\n"
+        "except sm.errors.OptionError as error:\n    assert 'notebooks' in str(error)\n"
+        "    scene.save(scene.loops(samples.double_torus()), 'x.png')",
+        tmp_path,
+    )
