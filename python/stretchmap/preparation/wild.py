@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -106,6 +107,8 @@ def run_ftetwild(
     ------
     SolverError
         If it gives up.
+    MissingDependencyError
+        If something it needs is not installed.
     """
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
@@ -116,6 +119,10 @@ def run_ftetwild(
         out = Path(folder, "solid.npz")
         if run.returncode or not out.exists():
             said = run.stderr.strip().splitlines() or ["no reason given"]
+            if missing := re.fullmatch(r"ModuleNotFoundError: No module named '(\w+)'.*", said[-1]):
+                raise MissingDependencyError(
+                    f"fTetWild needs {missing[1]}: pip install 'stretchmap[prepare]'"
+                )
             raise SolverError(f"fTetWild gives up on the surface ({said[-1]})")
         with np.load(out) as found:
             return found["V"], found["T"]

@@ -26,6 +26,7 @@ from stretchmap.errors import (
     OptionError,
     SelfIntersectionError,
 )
+from stretchmap.preparation import wild
 from stretchmap.preparation.handles import cut_handles
 from stretchmap.preparation.holes import close_holes, crossings, remove_crossings
 from stretchmap.preparation.rebuild import winding_mask
@@ -260,6 +261,13 @@ def test_ftetwild_leaves_no_files_where_it_is_called(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     sm.prepare(samples.torus_surface(40, 20), faces=800, filler="ftetwild")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_ftetwild_needs_is_named(monkeypatch):
+    pytest.importorskip("pytetwild")
+    monkeypatch.setattr(wild, "_SCRIPT", "import pyvista_that_is_not_there")
+    with pytest.raises(MissingDependencyError, match=r"pyvista_that_is_not_there.*\[prepare\]"):
+        sm.prepare(samples.torus_surface(40, 20), faces=800, filler="ftetwild")
 
 
 @pytest.mark.parametrize("seed", [3, 4])
