@@ -23,16 +23,19 @@ void keep_to_one_thread() {
 }
 
 int thread_count() { return omp_get_max_threads(); }
+int openmp_version() { return _OPENMP; }
 #else
 void set_thread_count(int) {}
 void keep_to_one_thread() {}
 int thread_count() { return 1; }
+int openmp_version() { return 0; }
 #endif
 
 }  // namespace
 
 void bind(py::module_& m) {
   m.def("thread_count", &thread_count);
+  m.def("openmp_version", &openmp_version);  // year and month of its standard, 0 without it
   m.def("set_thread_count", &set_thread_count, py::arg("count"));
   m.def("keep_to_one_thread", &keep_to_one_thread);
 }

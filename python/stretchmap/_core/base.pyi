@@ -1,7 +1,9 @@
 from __future__ import annotations
 import typing
-__all__: list[str] = ['keep_to_one_thread', 'set_thread_count', 'thread_count']
+__all__: list[str] = ['keep_to_one_thread', 'openmp_version', 'set_thread_count', 'thread_count']
 def keep_to_one_thread() -> None:
+    ...
+def openmp_version() -> int:
     ...
 def set_thread_count(count: typing.SupportsInt | typing.SupportsIndex) -> None:
     ...

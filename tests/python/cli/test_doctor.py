@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
+from pathlib import Path
 
 import pytest
 
 import stretchmap as sm
+from stretchmap import _core
 from stretchmap.cli import main
 from stretchmap.volume import map as volume
 
@@ -20,8 +23,20 @@ def test_doctor_tells_versions_and_maps_a_solid(tmp_path, capsys):
     assert report["stretchmap"] == sm.__version__
     assert report["self-test"].startswith("passed")
     assert int(report["threads"].split()[0]) >= 1
-    assert "typer" in report["extra cli"]
+    assert report["OpenMP"].isdigit() == (_core.base.openmp_version() > 0)
+    assert "typer" in report["extra cli"] and "scikit-fem" in report["extra fem"]
     assert report["self-test"] in capsys.readouterr().out
+
+
+def test_doctor_knows_every_extra_that_users_install():
+    from stretchmap.cli.doctor import _EXTRAS
+
+    tomllib = pytest.importorskip("tomllib")
+    project = Path(__file__).resolve().parents[3] / "pyproject.toml"
+    extras = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    for name in extras.keys() - {"bench", "test", "docs", "all"}:
+        packages = {re.match(r"[\w-]+", requirement)[0] for requirement in extras[name]}
+        assert packages == set(_EXTRAS[name]), name
 
 
 def test_doctor_fails_when_maps_do(monkeypatch):
