@@ -6,6 +6,7 @@ hexahedra sheared, some of them turned over; `optimize` makes them good.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..base.progress import Progress
 from ..base.torus import Torus
 from ..errors import OptionError, SolverError
 from ..maps.given import as_map_of_solid, torus_of
+from .boundary_layers import thicknesses_of, with_layers
 from .hex_result import HexMesh
 from .layout import Layout, prolongation, swept_layout
 from .optimize import GridOptimizer, Schedule
@@ -47,6 +49,7 @@ def hex_mesh(
     sections: int | None = None,
     block: int | None = None,
     rings: int | None = None,
+    layers: Sequence[float] | None = None,
     optimize: bool = True,
     progress: Progress | None = None,
 ) -> HexMesh:
@@ -68,6 +71,9 @@ def hex_mesh(
     sections, block, rings : int, optional
         Instead, or in place of some of the numbers chosen: hexahedra round the axis, at least 3;
         along a side of the middle block; layers between block and boundary.
+    layers : sequence of float, optional
+        Thicknesses of layers of hexahedra at the boundary, from there inwards, measured along the
+        normals at its points; the outermost ring is split, which adds as many rings.
     optimize : bool
         Optimize shape and fit of the boundary. False: the grid as it was pulled back, its boundary
         points on the surface, often with hexahedra that are not valid.
@@ -86,8 +92,8 @@ def hex_mesh(
     KindError
         If it is no map, or that of a surface.
     SolverError
-        If the core of the torus lies outside the image, or hexahedra are left that could not be
-        made valid; then ``ids`` are those.
+        If the core of the torus lies outside the image, the layers do not fit, or hexahedra are
+        left that could not be made valid; then ``ids`` are those.
 
     Notes
     -----
@@ -109,6 +115,7 @@ def hex_mesh(
     """
     result, solid = as_map_of_solid(result, "a grid of hexahedra")
     callback("progress", progress)
+    thicknesses = thicknesses_of(layers)
     torus = torus_of(result)
     numbers = _numbers(solid.volume, torus.ratio, n_hexahedra, target_size, sections, block, rings)
     count = numbers[0] * numbers[1] * (numbers[1] + 4 * numbers[2])
@@ -131,6 +138,10 @@ def hex_mesh(
             V = _optimized(V, layout.H, solid, _FINER, progress)
         if levels:
             grid = torus.xi(layout.u, layout.v, layout.share * torus.r)
+    if len(thicknesses):
+        layout, V, (grid, pulled) = with_layers(numbers, V, (grid, pulled), thicknesses)
+        if optimize:
+            _require_valid(V, layout.H, "the layers are too thick for the bends of the boundary")
     return _measured(solid, torus, layout, grid, pulled, V, n_invalid)
 
 
@@ -171,14 +182,17 @@ def _optimized(
 ) -> NDArray[np.float64]:
     optimizer = GridOptimizer(V, H, solid.surface)
     optimizer.run(schedule, progress)
-    left = np.flatnonzero(_core.resample.valid_hexes(optimizer.V, H) == 0)
-    if len(left):
-        raise SolverError(
-            f"{len(left)} hexahedra could not be made valid; try other numbers of sections, block "
-            "or rings, optimize=False returns the grid as it was pulled back",
-            left,
-        )
+    _require_valid(
+        optimizer.V, H, "try other numbers of sections, block or rings, optimize=False returns the "
+        "grid as it was pulled back",
+    )  # fmt: skip
     return optimizer.V
+
+
+def _require_valid(V: NDArray[np.float64], H: NDArray[np.int32], remedy: str) -> None:
+    left = np.flatnonzero(_core.resample.valid_hexes(V, H) == 0)
+    if len(left):
+        raise SolverError(f"{len(left)} hexahedra could not be made valid; {remedy}", left)
 
 
 def _pulled_back(

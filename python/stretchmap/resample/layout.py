@@ -71,7 +71,7 @@ def prolongation(sections: int, block: int, rings: int) -> sp.csr_array:
     csr_array, shape (n', n)
     """
     side = block + 1
-    rim = _rim(np.arange(side * side).reshape(side, side))
+    rim = rim_of_block(block)
     layers = np.concatenate(
         [rim[None], side * side + np.arange(rings * len(rim)).reshape(rings, -1)]
     )
@@ -85,6 +85,12 @@ def prolongation(sections: int, block: int, rings: int) -> sp.csr_array:
     pad = sp.csr_array((to_square.shape[0], rings * len(rim)))
     disk = sp.vstack([sp.hstack([to_square, pad]), around @ select])
     return sp.csr_array(sp.kron(_halved(sections, cyclic=True), disk))
+
+
+def rim_of_block(block: int) -> NDArray[np.intp]:
+    """The outer points of the middle block of a section, in the order of those of a ring."""
+    side = block + 1
+    return _rim(np.arange(side * side).reshape(side, side))
 
 
 def _halved(n: int, cyclic: bool = False) -> sp.csr_array:
