@@ -177,25 +177,27 @@ def tradeoff(meshes: Meshes) -> Rows:
 
 
 def grids(meshes: Meshes) -> Rows:
-    """Hexahedral grids of the default size, from maps that keep shape."""
+    """Hexahedral grids of two sizes, from maps between shape and volume."""
     yield (
         "mesh", "hexahedra", "not valid when pulled back", "after", "least scaled Jacobian",
         "mean", "below 0.2", "0.3", "0.5", "SD of volume ratios", "error of the volume",
         "grid to surface", "surface to grid", "farthest point moved", "s",
     )  # fmt: skip
     for name, solid in meshes.items():
-        result = sm.volume_map(solid, balance=1.0 / 3.0)
-        start = time.perf_counter()
-        grid = hex_mesh(result)
-        seconds = time.perf_counter() - start
-        worst = grid.scaled_jacobians
-        yield (
-            name, len(grid.H), grid.n_pulled_back_invalid, grid.n_invalid, f"{worst.min():.3f}",
-            f"{worst.mean():.3f}", *(percent((worst < limit).mean()) for limit in (0.2, 0.3, 0.5)),
-            f"{grid.volume_ratios.std():.3f}", percent(abs(grid.volume / solid.volume - 1.0)),
-            percent(grid.grid_to_surface), percent(grid.surface_to_grid), percent(grid.moved),
-            f"{seconds:.1f}",
-        )  # fmt: skip
+        result = sm.volume_map(solid, balance=0.5)
+        for count in (5_000, 40_000):
+            start = time.perf_counter()
+            grid = hex_mesh(result, n_hexahedra=count)
+            seconds = time.perf_counter() - start
+            worst = grid.scaled_jacobians
+            yield (
+                name, len(grid.H), grid.n_pulled_back_invalid, grid.n_invalid,
+                f"{worst.min():.3f}", f"{worst.mean():.3f}",
+                *(percent((worst < limit).mean()) for limit in (0.2, 0.3, 0.5)),
+                f"{grid.volume_ratios.std():.3f}", percent(abs(grid.volume / solid.volume - 1.0)),
+                percent(grid.grid_to_surface), percent(grid.surface_to_grid), percent(grid.moved),
+                f"{seconds:.1f}",
+            )  # fmt: skip
 
 
 def registrations(meshes: Meshes) -> Rows:
