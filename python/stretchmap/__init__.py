@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from .registration.landmarks import read_landmarks as read_landmarks
     from .registration.map import Registration as Registration
     from .registration.map import register as register
+    from .registration.quality import inverse_consistency as inverse_consistency
     from .resample.fields import transfer as transfer
     from .resample.hex_result import HexMesh as HexMesh
     from .resample.hexes import hex_mesh as hex_mesh
@@ -156,6 +157,7 @@ _EXPORTS = {
     "read_landmarks": "registration.landmarks",
     "Registration": "registration.map",
     "register": "registration.map",
+    "inverse_consistency": "registration.quality",
     "HexMesh": "resample.hex_result",
     "hex_mesh": "resample.hexes",
     "transfer": "resample.fields",

@@ -168,7 +168,9 @@ def correspond(
     if along == "smooth":
         found, moved, distance, note = _smooth(given, solid, start, landmarks, volume_weight)
     if found is None:
-        found = _registered(given, solid, landmarks)
+        # What is asked for by area is asked to keep volumes; what stands in for a smooth map is to
+        # stay close to one.
+        found = _registered(given, solid, landmarks, "glide" if along == "area" else "frozen")
         moved = found.image[: given.solid.n_vertices]
     return Correspondence(
         mesh=found.mesh,
@@ -186,11 +188,17 @@ def correspond(
     )
 
 
-def _registered(template: Template, solid: TetMesh, landmarks: Array | None) -> Registration:
-    if landmarks is None or template.anchors is None:
-        return register(template.solid, solid)
-    surface = template.solid.surface
-    return register(template.solid, solid, (template.anchors.at(surface.V, surface.F), landmarks))
+def _registered(
+    template: Template,
+    solid: TetMesh,
+    landmarks: Array | None,
+    boundary: Literal["glide", "frozen"],
+) -> Registration:
+    marks = None
+    if landmarks is not None and template.anchors is not None:
+        surface = template.solid.surface
+        marks = (template.anchors.at(surface.V, surface.F), landmarks)
+    return register(template.solid, solid, marks, boundary=boundary)
 
 
 def _smooth(

@@ -12,6 +12,7 @@ import logging
 import os
 import time
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -37,6 +38,7 @@ from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
 from .match import affine_landmark_map, match_surfaces
+from .quality import surface_distance
 
 __all__ = ["Registration", "register"]
 
@@ -68,11 +70,14 @@ class Registration(MapResult):
         ``"smooth"`` or ``"affine"``.
     refinement : Refinement or None
         Of the source, its boundary edges split first.
+    boundary : str
+        ``"glide"`` or ``"frozen"``: whether boundary vertices moved on the target's surface to keep
+        volumes below it.
     boundary_splits : int
         Edges of the source's boundary that were split where it was too coarse: its image would
         cross itself, or the affine map turn a face over.
     history : tuple of IterationRecord
-        Stages ``"match"``, ``"vsem"``, ``"untangle"``, ``"frozen"``.
+        Stages ``"match"``, ``"untangle"``, ``"frozen"``, ``"glide"``.
     distortion : Distortion
     certificate : Certificate
     converged : bool
@@ -99,8 +104,14 @@ class Registration(MapResult):
     gauge: Gauge
     landmark_map: LandmarkMap
     refinement: Refinement | None = field(repr=False)
+    boundary: str
     boundary_splits: int
     certificate: Certificate
+
+    @cached_property
+    def surface_distance(self) -> float:
+        """Hausdorff distance of the image's boundary from the target's, as `surface_distance`."""
+        return surface_distance(self)
 
     def extra_scalars(self) -> dict[str, Any]:
         """Landmarks, gauge, landmark map and what was added to the input mesh."""
@@ -109,9 +120,11 @@ class Registration(MapResult):
         return {
             "certified": self.certificate.certified,
             "certificate": self.certificate.to_dict(),
+            "boundary": self.boundary,
             "landmark_map": self.landmark_map,
             "landmarks": len(self.landmarks),
             "landmark_error": self.landmark_error,
+            "surface_distance": self.surface_distance,
             "snapped": float(snapped.max()) if snapped.size else 0.0,
             "gauge": dataclasses.asdict(self.gauge),
             "boundary_splits": self.boundary_splits,
@@ -133,6 +146,7 @@ def register(
     target: TetMesh,
     landmarks: Landmarks | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
     *,
+    boundary: Literal["glide", "frozen"] = "glide",
     landmark_map: LandmarkMap = "smooth",
     max_iter: int = 300,
     tol: float = 1e-3,
@@ -150,6 +164,12 @@ def register(
     landmarks : Landmarks, (source, target), path or None
         Pairs that correspond: vertex ids (k,) or points (k, 3) on either side, or a CSV file (see
         `read_landmarks`). Points are moved to the nearest boundary vertex; the result says how far.
+    boundary : {"glide", "frozen"}
+        ``"glide"``: boundary vertices, but for landmarks, move on the target's surface until
+        volumes are kept below it as they are inside. ``"frozen"``: they stay where the matching of
+        the surfaces put them, which is closer to where a smooth deformation that does not keep
+        volumes would. A map that gliding would make cross itself is kept frozen; the result says
+        which it is.
     landmark_map : {"smooth", "affine"}
         How landmarks are reached after the surfaces were matched for least distortion of area and
         shape. ``"smooth"``: by the same matching with the landmarks held, kept free of folds by a
@@ -204,6 +224,7 @@ def register(
     (True, True)
     """
     source, target = as_solid(source, "source"), as_solid(target, "target")
+    one_of("boundary", boundary, ("glide", "frozen"))
     one_of("landmark_map", landmark_map, ("smooth", "affine"))
     max_iter, tol = whole("max_iter", max_iter, 0), real("tol", tol, 0.0)
     keep_best = flag("keep_best", keep_best)
@@ -215,19 +236,20 @@ def register(
     marks = _landmarks(landmarks, source, target)
     seconds: dict[str, float] = {}
     clock = time.perf_counter()
-    boundary, gauge, history = _boundary_map(
+    embedded, gauge, history = _boundary_map(
         source, target, marks, landmark_map, max_iter, tol, progress
     )
     seconds["boundary"] = time.perf_counter() - clock
-    if len(boundary.crossings) and not keep_best:
+    if len(embedded.crossings) and not keep_best:
         raise CertificationError(
-            f"{len(boundary.crossings)} pairs of faces of the boundary image cross, and refining "
+            f"{len(embedded.crossings)} pairs of faces of the boundary image cross, and refining "
             "the source's boundary does not help: the surfaces differ too much; landmarks may "
             "bring them together, keep_best=True returns the map all the same",
-            boundary.crossings.ravel(),
+            embedded.crossings.ravel(),
         )
+    glide = boundary == "glide" and not len(embedded.crossings)
     return _fill(
-        boundary, target, marks, gauge, landmark_map, history,
+        embedded, glide, target, marks, gauge, landmark_map, history,
         FillOptions() if options is None else options, keep_best, seconds, progress,
     )  # fmt: skip
 
@@ -286,6 +308,7 @@ def _boundary_map(
 
 def _fill(
     boundary: EmbeddedBoundary,
+    glide: bool,
     target: TetMesh,
     marks: Landmarks,
     gauge: Gauge,
@@ -296,19 +319,30 @@ def _fill(
     seconds: dict[str, float],
     progress: Progress | None,
 ) -> Registration:
-    """The volume map with the boundary prescribed."""
+    """The volume map whose boundary is prescribed, or glides from there."""
     clock = time.perf_counter()
     source, points = boundary.split.solid, boundary.points
-    problem = VolumeProblem.of(source, points, refine=options.refine)
-    outcome = solve(problem, options, progress=progress)
+    problem = VolumeProblem.of(
+        source, points, ground=target.surface if glide else None, pinned=marks.source,
+        refine=options.refine,
+    )  # fmt: skip
+    skin = source.boundary_vertices
+    start = problem.x[skin]
+    outcome = solve(problem, options, glide=glide, progress=progress)
     problem, refined = outcome.problem, outcome.problem.refinement
     added = Refinement.of(boundary.split) if refined is None else refined.after(boundary.split)
     seconds = {**seconds, "volume": time.perf_counter() - clock}
     solid, converged, stop_reason = problem.solid, outcome.converged, outcome.stop_reason
     image = problem.x * problem.length + problem.center
-    image[source.boundary_vertices] = points
+    moved = (problem.x[skin] != start).any(axis=1)
+    image[skin[~moved]] = points[~moved]
     clock = time.perf_counter()
     certificate = certify(solid, image)
+    if not certificate.certified and outcome.glided:  # a matter of rounding
+        return _fill(
+            boundary, False, target, marks, gauge, landmark_map, history, options,
+            keep_best, seconds, progress,
+        )  # fmt: skip
     seconds["certificate"] = time.perf_counter() - clock
     if not keep_best:
         require_certified(certificate, "the registration")
@@ -325,6 +359,7 @@ def _fill(
         gauge=gauge,
         landmark_map=landmark_map,
         refinement=added if added.n_split else None,
+        boundary="glide" if outcome.glided else "frozen",
         boundary_splits=boundary.split.n_split,
         history=history + outcome.history,
         certificate=certificate,

@@ -25,6 +25,7 @@ from ..errors import CertificationError
 from ..mesh.refinement import crowded_edges
 from .equalize import equalize
 from .exact_rings import make_rings_exact
+from .ground import glide_on_mesh
 from .minimize import minimize
 from .model import Budget, History
 from .options import FillOptions, VolumeOptions
@@ -89,7 +90,7 @@ def solve(
     options : FillOptions
         `VolumeOptions` if the boundary lies on a torus.
     glide : bool
-        Whether the boundary may move on the torus.
+        Whether the boundary may move on the torus, or the mesh, it lies on.
     budget : Budget, optional
         Default: what the options allow.
     patience : float
@@ -101,12 +102,15 @@ def solve(
     problem = started(problem, solver=options.solver, tol=_START_TOL)
     run = _Run(problem, options, History(problem.model(options), budget.share(patience), progress))
     run.seconds["start"] = time.perf_counter() - clock
+    on_mesh = glide and problem.ground is not None
     with run.timed("untangle"):
-        left = _untangle(run, glide=glide)
+        left = _untangle(run, glide=glide and not on_mesh)
     if left:
         reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")
     run.history.budget = budget
+    if on_mesh:
+        return _glided_on_mesh(run)
     converged, reason, newton = _minimize(run, glide=glide)
     exact = False
     graph = not len(run.problem.held)
@@ -265,6 +269,29 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
         if not _keep(run, done.x, True, "the map with a held boundary is kept"):
             return False, "gliding would fold the boundary", None
     return converged, reason, newton
+
+
+def _glided_on_mesh(run: _Run) -> Outcome:
+    """With the boundary gliding on a mesh; held, if that makes it cross itself."""
+    o, history = run.options, run.history
+    weight = min(o.frozen_weight, o.volume_weight)
+    with run.timed("frozen"):
+        run.x = minimize(
+            history.model, run.x, history, glide=False, start=min(1.0, weight), goal=weight
+        ).x
+    with run.timed("glide"):
+        done = glide_on_mesh(run.problem, o, history, start=weight)
+    glided = done is not None
+    if done is None:
+        run.take(run.problem)
+        with run.timed("frozen"):
+            done = minimize(
+                history.model, run.x, history, glide=False, start=weight, goal=o.volume_weight
+            )
+        _log.warning("the boundary is held: gliding makes its image cross itself")
+    run.x = done.x
+    outcome = _outcome(run, done.converged, done.reason)
+    return dataclasses.replace(outcome, glided=glided)
 
 
 def require_certified(certificate: Certificate, what: str) -> None:

@@ -18,6 +18,7 @@ from .model import History, SolidModel
 __all__ = ["Minimized", "minimize"]
 
 _SERVED = 0.5  # a shorter step shows that a Hessian is too old
+_DRIFT = 1e-4  # of the volume enclosed, before targets are set anew
 _REST = 6  # steps with a Hessian each after one was too old
 
 
@@ -80,7 +81,7 @@ def minimize(
     history : History
         Gets a record per step, of the stage ``"glide"`` or ``"frozen"``.
     glide : bool
-        Whether boundary vertices move on the torus.
+        Whether boundary vertices move on their surface.
     start, goal : float
     """
     o = model.options
@@ -90,11 +91,16 @@ def minimize(
     newton = model.newton(x, glide=glide)
     if not glide:
         newton.set_targets(model.targets)
-    weight, sharing = start, _Sharing(o.shared)
+    weight, sharing, enclosed = start, _Sharing(o.shared), 0.0
     for iteration in range(1, total + 1):
         if history.budget.spent:
             return Minimized(x, False, "the time limit was reached", newton)
         weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
+        if glide and model.ground is not None:
+            total = float(_core.mesh.tet_volumes(x, model.T).sum())
+            if abs(total - enclosed) > _DRIFT:
+                newton.set_targets(model.inflating(total))
+                enclosed = total
         linear = _core.volume.NewtonOptions(
             tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=sharing.kept > 0
         )

@@ -14,6 +14,7 @@ from .. import _core
 from ..base.progress import Progress, report
 from ..base.torus import Torus
 from ..maps.history import IterationRecord
+from ..mesh.meshes import TriMesh
 from .options import FillOptions
 
 __all__ = ["Budget", "History", "SolidModel", "face_areas"]
@@ -40,11 +41,13 @@ class SolidModel:
     options : FillOptions
     torus : Torus or None
         What the boundary may glide on; None where it is prescribed.
+    ground : TriMesh or None
+        The same, of a boundary that glides on a mesh.
     scale : ndarray, shape (n,), or None
         Logarithm of the length an image piece may be expected to have, relative to its source: what
         the boundary image has there, spread inside. None: 0 everywhere.
-    held : ndarray of intp
-        Boundary vertices that stay in place where the others glide.
+    held, pinned : ndarray of intp
+        Boundary vertices that stay in place where the others glide: for the time being, for good.
     """
 
     V: NDArray[np.float64]
@@ -55,6 +58,8 @@ class SolidModel:
     torus: Torus | None = None
     scale: NDArray[np.float64] | None = None
     held: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    ground: TriMesh | None = None
+    pinned: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     @cached_property
     def shares(self) -> NDArray[np.float64]:
@@ -127,9 +132,8 @@ class SolidModel:
     def gliding(
         self, faces: NDArray[np.int32], number: NDArray[np.int32] | None = None
     ) -> _core.volume.GlidingBoundary:
-        """The torus and the rest shapes of boundary faces (m, 3), whose vertices are renumbered."""
-        assert self.torus is not None
-        surface = _core.volume.TorusSurface(self.torus.R, self.torus.r)
+        """That surface and the rest shapes of boundary faces (m, 3), their vertices renumbered."""
+        surface = self.glide_surface
         rest = _core.volume.rest_triangles(
             self.V, faces, surface.area / self._source_area, self.options.max_aspect
         )
@@ -140,6 +144,29 @@ class SolidModel:
             weights=face_areas(self.V, faces) / self._source_area,
         )
 
+    def inflating(self, enclosed: float) -> NDArray[np.float64]:
+        """Volume to ask of each tet whose boundary glides on a mesh, relative to its share: (k,).
+
+        The image of a coarse boundary cuts off what is sharp and encloses less than the mesh.
+        Asked for their share of the mesh, all tets press outward until it is filled as far as can
+        be; but those with little weight for their size would bear most of what is missing. So each
+        is asked for so much more than its share of what is enclosed by now that at rest under equal
+        pressure the shares are kept.
+        """
+        assert self.ground is not None
+        yielding = self.shares / self.weights
+        missing = self.ground.volume - enclosed
+        asked = enclosed + missing * yielding / float(self.shares @ yielding)
+        return np.asarray(np.maximum(asked, 0.5 * enclosed))
+
+    @cached_property
+    def glide_surface(self) -> _core.volume.GlideSurface:
+        """What the boundary may glide on."""
+        if self.ground is not None:
+            return _core.volume.MeshSurface(self.ground.V, self.ground.F)
+        assert self.torus is not None
+        return _core.volume.TorusSurface(self.torus.R, self.torus.r)
+
     @cached_property
     def _source_area(self) -> float:
         return float(face_areas(self.V, self.faces).sum())
@@ -149,6 +176,7 @@ class SolidModel:
         motion = np.full(len(self.V), FREE, np.uint8)
         motion[self.boundary] = GLIDING if glide else FIXED
         motion[self.held] = FIXED
+        motion[self.pinned] = FIXED
         return motion
 
     @cached_property

@@ -13,6 +13,7 @@ from .. import _core
 from ..base.torus import Torus
 from ..errors import DegenerateError, OrientationError
 from ..maps.history import IterationRecord
+from ..mesh.meshes import TriMesh
 from ..mesh.overconstrained import overconstrained_elements
 from ..mesh.refinement import Refinement, refine_overconstrained
 from .anisotropy import unstretching
@@ -45,8 +46,10 @@ class VolumeProblem:
         Whether ``x`` is a whole map.
     torus : Torus or None
         What the boundary lies on here, if it may glide; centered at the origin.
+    ground : TriMesh or None
+        The same if that is a mesh.
     scale : ndarray, shape (n,), or None
-    held : ndarray of intp
+    held, pinned : ndarray of intp
         As in `SolidModel`.
     """
 
@@ -60,6 +63,8 @@ class VolumeProblem:
     torus: Torus | None = None
     scale: NDArray[np.float64] | None = None
     held: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    ground: TriMesh | None = None
+    pinned: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     @classmethod
     def of(
@@ -68,6 +73,8 @@ class VolumeProblem:
         image: NDArray[np.float64],
         *,
         torus: Torus | None = None,
+        ground: TriMesh | None = None,
+        pinned: NDArray[np.int32] | None = None,
         refine: bool | None = True,
     ) -> VolumeProblem:
         """Of an image of the boundary vertices (nb, 3), or of all vertices (n, 3) to go on from.
@@ -78,6 +85,10 @@ class VolumeProblem:
         image : ndarray
         torus : Torus, optional
             What the boundary image lies on.
+        ground : TriMesh, optional
+            The same if that is a mesh.
+        pinned : ndarray of int32, optional
+            Boundary vertices that do not glide on it.
         refine : bool or None
             Whether overconstrained elements are split or refused; None: neither.
 
@@ -121,6 +132,8 @@ class VolumeProblem:
             length=length,
             warm=warm,
             torus=None if torus is None else torus.scaled(1.0 / length),
+            ground=None if ground is None else TriMesh((ground.V - center) / length, ground.F),
+            pinned=np.empty(0, np.intp) if pinned is None else pinned.astype(np.intp),
         )
 
     def halved(self, edges: NDArray[np.int32]) -> VolumeProblem:
@@ -152,6 +165,8 @@ class VolumeProblem:
             torus=self.torus,
             scale=self.scale,
             held=self.held,
+            ground=self.ground,
+            pinned=self.pinned,
         )
 
 
@@ -169,6 +184,8 @@ class Outcome:
     seconds : dict
         By stage.
     vertex_exact : bool
+    glided : bool
+        Whether the boundary did on a mesh.
     """
 
     problem: VolumeProblem
@@ -177,6 +194,7 @@ class Outcome:
     stop_reason: str
     seconds: dict[str, float]
     vertex_exact: bool = False
+    glided: bool = False
 
 
 def _refuse_overconstrained(solid: TetMesh) -> None:

@@ -172,7 +172,7 @@ def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDA
     """Tets that are inverted, by exact signs, or lie at a folded boundary face."""
     stuck = np.zeros(len(model.T), bool)
     stuck[_core.certificate.not_positive_tets(x, model.T)] = True
-    if glide and model.torus is not None:
+    if glide:
         folded = folded_faces(model, x)
         touched = np.ones(len(model.V), bool)
         touched[model.boundary] = False
@@ -185,7 +185,9 @@ def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDA
 
 def folded_faces(model: SolidModel, x: NDArray[np.float64]) -> NDArray[np.intp]:
     """Boundary faces that do not look outward everywhere, and of which a vertex may glide."""
-    assert model.torus is not None
+    if model.torus is None:
+        rows = model.gliding_faces
+        return rows[~(model.gliding(model.faces[rows]).facing(x) > 0.0)]
     folded = _core.certificate.torus_graph(x, model.faces, model.torus.R).bad
     return np.intersect1d(folded, model.gliding_faces)
 

@@ -1,0 +1,86 @@
+"""Letting the boundary glide on a triangle mesh.
+
+A mesh is smooth on the whole only. A face of the boundary image that lies across a sharp edge may
+seem folded without being so: its vertices are held until it does no longer. And faces that are
+graphs over the mesh may yet cross each other where it is thin: those are held next time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .minimize import Minimized, minimize
+from .model import History
+from .options import FillOptions
+from .problem import VolumeProblem
+from .untangle import folded_faces
+
+__all__ = ["glide_on_mesh"]
+
+_log = logging.getLogger("stretchmap")
+
+_TRIES, _RELEASES = 4, 2
+_MOST_PAIRS = 10_000
+
+
+def glide_on_mesh(
+    problem: VolumeProblem, options: FillOptions, history: History, *, start: float
+) -> Minimized | None:
+    """Least volume distortion with the boundary gliding on ``problem.ground``.
+
+    Parameters
+    ----------
+    problem : VolumeProblem
+        Its image without inverted tets, its boundary without crossing faces.
+    options : FillOptions
+    history : History
+        Gets a record per step, of the stage ``"glide"``.
+    start : float
+        Weight of the volume term to begin with.
+
+    Returns
+    -------
+    Minimized or None
+        As certifiable as what was given; None if the boundary crosses itself, whatever is held.
+    """
+    x, first = problem.x, start
+    held, found = _folded(problem, options, x), None
+    tries = releases = 0
+    while tries < _TRIES:
+        history.model = dataclasses.replace(problem, held=held).model(options)
+        done = minimize(
+            history.model, x, history, glide=True, start=first, goal=options.volume_weight
+        )
+        crossing = _crossing(problem, done.x)
+        if len(crossing):
+            if found is not None:
+                break  # what was let go is at fault
+            _log.info("%d vertices of the gliding boundary cross: held", len(crossing))
+            held, tries = np.union1d(held, crossing), tries + 1
+            continue
+        found, x = done, done.x
+        still = np.intersect1d(_folded(problem, options, x), held)
+        if len(still) == len(held) or releases == _RELEASES or history.budget.spent:
+            break
+        held, first, releases = still, options.volume_weight, releases + 1
+    return found
+
+
+def _folded(
+    problem: VolumeProblem, options: FillOptions, x: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """Vertices of faces that do not look outward."""
+    model = problem.model(options)
+    return np.unique(model.faces[folded_faces(model, x)]).astype(np.intp)
+
+
+def _crossing(problem: VolumeProblem, x: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Boundary vertices of faces that cross others."""
+    ids, F = problem.solid.boundary_vertices, problem.solid.surface.F
+    pairs = _core.certificate.crossing_faces(np.ascontiguousarray(x[ids]), F, _MOST_PAIRS)
+    return np.unique(ids[F[np.unique(pairs)]]).astype(np.intp)

@@ -1,0 +1,134 @@
+"""Registration whose boundary glides on the target: what it keeps, holds, and gives up."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap import _core, samples
+from stretchmap.errors import KindError, OptionError
+from stretchmap.volume import engine, ground
+from stretchmap.volume.options import FillOptions
+from stretchmap.volume.problem import VolumeProblem
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return samples.vertebra_pair(n_landmarks=12, n_tets=(2500, 3500))
+
+
+@pytest.fixture(scope="module")
+def maps(pair):
+    marks = pair.source_landmarks, pair.target_landmarks
+    return {
+        way: sm.register(pair.source, pair.target, marks, boundary=way)
+        for way in ("frozen", "glide")
+    }
+
+
+def from_surface(points, surface):
+    """Distance of points from a surface, over its diagonal."""
+    feet = _core.maps.SurfaceTree(surface.V, surface.F).closest(np.ascontiguousarray(points))[0]
+    return np.linalg.norm(feet - points, axis=1).max() / np.linalg.norm(np.ptp(surface.V, axis=0))
+
+
+def test_gliding_keeps_volumes_below_the_boundary(pair, maps):
+    held, glided = maps["frozen"], maps["glide"]
+    assert glided.certificate.certified and glided.boundary == "glide"
+    assert held.boundary == "frozen"
+    assert glided.distortion.ring_std < 0.65 * held.distortion.ring_std
+    assert glided.distortion.total_distortion < 0.65 * held.distortion.total_distortion
+    assert "glide" in {record.stage for record in glided.history}
+
+
+def test_landmarks_are_held_and_the_boundary_stays_on_the_target(pair, maps):
+    glided = maps["glide"]
+    assert np.array_equal(glided.image[pair.source_landmarks], pair.target.V[pair.target_landmarks])
+    skin = glided.mesh.boundary_vertices
+    assert from_surface(glided.image[skin], pair.target.surface) < 1e-9
+    moved = np.linalg.norm((glided.image - maps["frozen"].image)[skin], axis=1)
+    assert np.count_nonzero(moved > 0.0) > 0.9 * (len(skin) - 12)
+
+
+@pytest.mark.parametrize("seed", [1, 4, 9])
+def test_pairs_of_a_population_nothing_was_tuned_on(seed):
+    bones = samples.vertebra_population(2, seed=seed, n_tets=2000)
+    result = sm.register(*bones.solids)
+    assert result.certificate.certified and result.boundary == "glide"
+    held = sm.register(*bones.solids, boundary="frozen").distortion
+    assert result.distortion.ring_std < max(0.03, 0.5 * held.ring_std)
+    assert 0.9 < result.distortion.image_total / bones.solids[1].volume < 1.02
+
+
+def test_the_frozen_map_is_kept_where_gliding_crosses(pair, maps, monkeypatch, caplog):
+    monkeypatch.setattr(engine, "glide_on_mesh", lambda *_, **__: None)
+    marks = pair.source_landmarks, pair.target_landmarks
+    result = sm.register(pair.source, pair.target, marks)
+    assert result.boundary == "frozen" and result.certificate.certified
+    assert "the boundary is held" in caplog.text
+    # By way of a smaller weight, to the same end.
+    assert result.distortion.ring_std == pytest.approx(maps["frozen"].distortion.ring_std, rel=0.05)
+
+
+def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
+    held = maps["frozen"]
+    problem = VolumeProblem.of(held.mesh, held.image, ground=pair.target.surface, refine=None)
+    model = problem.model(FillOptions())
+    history = engine.History(model, engine.Budget(60.0))
+    some = held.mesh.boundary_vertices[[3, 50, 200]].astype(np.intp)
+    answers = [some]
+    true_crossing = ground._crossing
+    monkeypatch.setattr(
+        ground, "_crossing", lambda p, x: answers.pop() if answers else true_crossing(p, x)
+    )
+    monkeypatch.setattr(ground, "_RELEASES", 0)
+    options = dataclasses.replace(FillOptions(), glide_iter=3)
+    done = ground.glide_on_mesh(problem, options, history, start=10.0)
+    assert done is not None
+    assert np.array_equal(done.x[some], problem.x[some])
+    assert not np.array_equal(
+        done.x[held.mesh.boundary_vertices], problem.x[held.mesh.boundary_vertices]
+    )
+    assert not len(true_crossing(problem, done.x))
+    monkeypatch.setattr(ground, "_crossing", lambda p, x: some)
+    assert ground.glide_on_mesh(problem, options, history, start=10.0) is None
+
+
+def test_targets_ask_for_what_is_missing_and_no_more(pair, maps):
+    held = maps["frozen"]
+    problem = VolumeProblem.of(held.mesh, held.image, ground=pair.target.surface, refine=None)
+    model = problem.model(FillOptions())
+    asked = model.inflating(1.0)
+    assert model.shares @ asked == pytest.approx(problem.ground.volume)
+    # At rest under equal pressure the volume term's force per volume is the same for all tets.
+    force = model.weights / model.shares * (1.0 - asked)
+    assert np.ptp(force) < 1e-9 * np.abs(force).max()
+
+
+def test_the_distance_from_the_target_is_that_of_its_parts(pair, maps):
+    result = maps["glide"]
+    skin = result.image[result.mesh.boundary_vertices]
+    image = sm.TriMesh(skin, result.mesh.surface.F)
+    size = np.linalg.norm(np.ptp(image.V, axis=0)) / np.linalg.norm(np.ptp(pair.target.V, axis=0))
+    assert result.surface_distance >= size * from_surface(pair.target.surface.V, image) - 1e-12
+    assert result.surface_distance < 0.1
+    assert result.to_dict()["surface_distance"] == result.surface_distance
+
+
+def test_there_and_back_is_measured(pair, maps):
+    marks = pair.target_landmarks, pair.source_landmarks
+    back = sm.register(pair.target, pair.source, marks)
+    gaps = sm.inverse_consistency(maps["glide"], back)
+    assert gaps.shape == (maps["glide"].mesh.n_vertices,)
+    assert np.isnan(gaps).mean() < 0.01 and np.nanmedian(gaps) < 0.03
+    assert np.nanmax(gaps[pair.source_landmarks]) < 1e-9
+    with pytest.raises(KindError):
+        sm.inverse_consistency(maps["glide"], maps["glide"])
+
+
+def test_ways_of_the_boundary_are_named(pair):
+    with pytest.raises(OptionError):
+        sm.register(pair.source, pair.target, boundary="hold")
