@@ -158,5 +158,6 @@ HOSTILE: dict[str, dict[str, Callable[[], Any]]] = {
 }
 HOSTILE["steps"] = {name: make for name, make in HOSTILE["whole"].items() if name != "10^9"}
 HOSTILE["gaps"] = {name: make for name, make in HOSTILE["numbers"].items() if name != "nan"}
+HOSTILE["ceiling"] = {k: v for k, v in HOSTILE["positive"].items() if k != "infinity"}
 del HOSTILE["flag"]["true"]
 del HOSTILE["progress"]["class"]  # it can be called

@@ -88,7 +88,7 @@ class DistortionEnergy(Energy):
         self._weights = _core.volume.EnergyWeights(
             real("shape", shape, 0.0), real("volume", volume, 0.0), real("epsilon", epsilon, 0.0)
         )
-        if max_aspect != math.inf:
+        if not (isinstance(max_aspect, float) and max_aspect == math.inf):
             max_aspect = real("max_aspect", max_aspect, 1.0)
         self._rest = _core.volume.rest_matrices(self.mesh.V, self.mesh.T, max_aspect)
         if weights is None:

@@ -11,6 +11,10 @@ import pytest
 ATTACK = Path(__file__).resolve().parents[2] / "attack"
 
 
+def test_every_public_argument_is_in_the_table():
+    assert last_line("calls.py", "--only", "no function")[0] == "0"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("only", "least"),
@@ -22,6 +26,7 @@ ATTACK = Path(__file__).resolve().parents[2] / "attack"
         ("stretchmap.prepare", 140),
         ("Options", 1000),
         ("population.", 600),
+        ("energies.", 250),
         ("Population.", 150),
     ],
 )
