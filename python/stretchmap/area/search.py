@@ -19,6 +19,9 @@ _SAMPLE = 6000  # faces that suffice for the search
 
 _PHASES = 36  # first round of the search around the tube
 _RATIOS = (1.25, 1.5, 2.0, 2.5, 3.2, 4.0, 6.0, 10.0)  # first round of the search for R / r
+_STARTS = 3  # ratios from which the second round begins, besides the conformal one
+_FINE, _FINEST = 0.01, 1e-5
+_GAIN = 1e-4  # least gain by which steps below the former go on
 
 
 def search_phase(
@@ -41,30 +44,46 @@ def search_phase(
     else:
         ratios = np.array([conformal if ratio == "conformal" else float(ratio)])
     width = np.array([0.0 if phase is not None else 1.0 / _PHASES, 0.2 * (len(ratios) > 1)])
-    candidates = np.array([(p, r) for r in ratios for p in phases])
-    best = _best(reference, faces, turns, candidates)
-    while width.max() > 0.01:
-        width *= 0.5
-        offsets = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]) * width
-        candidates = np.unique(
-            np.column_stack(
-                [best[0] + offsets[:, 0], 1.0 + (best[1] - 1.0) * np.exp(offsets[:, 1])]
-            ),
-            axis=0,
-        )
-        best = _best(reference, faces, turns, candidates)
+    # Near a ratio of one the best phase is a narrow one: a ratio is judged by its own best.
+    rows = np.array([(p, r) for r in ratios for p in phases])
+    energies = _energies(reference, faces, turns, rows).reshape(len(ratios), -1)
+    order = np.argsort(energies.min(axis=1), kind="stable")
+    starts = dict.fromkeys([*order[:_STARTS].tolist(), 0])
+    found = []
+    for k in starts:
+        row, energy = rows[k * len(phases) + int(energies[k].argmin())], float(energies[k].min())
+        found.append(_refined(reference, faces, turns, row, energy, width))
+    best = min(found, key=lambda pair: pair[1])[0]
     return float(best[0] if phase is not None else best[0] % 1.0), float(best[1])
 
 
-def _best(
+def _refined(
+    reference: _core.area.SurfaceReference,
+    faces: NDArray[np.int32],
+    turns: NDArray[np.float64],
+    best: NDArray[np.float64],
+    energy: float,
+    width: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], float]:
+    """The best candidate round one, steps halved until they are short and bring nothing."""
+    while width.max() > _FINEST:
+        width = 0.5 * width
+        offsets = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]) * width
+        ratios = 1.0 + (best[1] - 1.0) * np.exp(offsets[:, 1])
+        candidates = np.unique(np.column_stack([best[0] + offsets[:, 0], ratios]), axis=0)
+        energies = _energies(reference, faces, turns, candidates)
+        before, energy = energy, float(energies.min())
+        best = candidates[int(energies.argmin())]
+        if width.max() <= _FINE and before - energy <= _GAIN * energy:
+            break
+    return best, energy
+
+
+def _energies(
     reference: _core.area.SurfaceReference,
     faces: NDArray[np.int32],
     turns: NDArray[np.float64],
     candidates: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    best = 0
-    if len(candidates) > 1:
-        qualities = _core.area.phase_qualities(reference, faces, turns, candidates)
-        best = int(np.argmin([quality.energy for quality in qualities]))
-    row: NDArray[np.float64] = candidates[best]
-    return row
+    qualities = _core.area.phase_qualities(reference, faces, turns, candidates)
+    return np.array([quality.energy for quality in qualities])
