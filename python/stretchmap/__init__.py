@@ -100,6 +100,8 @@ if TYPE_CHECKING:
     from .volume.map import volume_map as volume_map
     from .volume.options import FillOptions as FillOptions
     from .volume.options import VolumeOptions as VolumeOptions
+    from .volume.origin import Origin as Origin
+    from .volume.origin import origin_of as origin_of
     from .volume.own import Optimizer as Optimizer
 
 _EXPORTS = {
@@ -150,6 +152,8 @@ _EXPORTS = {
     "FillOptions": "volume.options",
     "fill": "volume.fill",
     "VolumeMap": "volume.map",
+    "Origin": "volume.origin",
+    "origin_of": "volume.origin",
     "VolumeOptions": "volume.options",
     "volume_map": "volume.map",
     "Optimizer": "volume.own",

@@ -1,0 +1,133 @@
+"""Where u and v begin, by a rule: comparable from one individual and one mesh to another.
+
+A map to the torus leaves open where its angles begin and which way they run. Either two landmarks
+decide, or the shape: with x the place of a tet in the body, c the body's center of mass and
+
+    M_k(a) = sum vol(t) |x_t - c|^2 exp(i k a_t),
+
+u begins at the phase of M_1(u), the direction round the hole in which the body reaches farthest,
+and v at the phase of M_1(v). Both angles may be reversed together, and nothing else keeps
+orientation: they run so that the imaginary part of the larger of the second moments, M_2(u) and
+M_2(v) taken from there, is positive. Being integrals, they hardly change with the mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.arrays import as_points
+from ..errors import ArrayError, LandmarkError
+
+if TYPE_CHECKING:
+    from .map import VolumeMap
+
+__all__ = ["Origin", "origin_of"]
+
+_TWO_PI = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the angles of a map begin, and which way they run.
+
+    Attributes
+    ----------
+    u, v : float
+        Of the map's own coordinates, radians.
+    sign : int
+        -1: both are reversed.
+    sureness : tuple of float
+        By shape: ``|M_1| / M_0`` of u and of v, and the size of the moment that decides the sign.
+        Of a body that looks the same all round they are zero, and the rule means nothing. By
+        landmarks: ones.
+
+    Examples
+    --------
+    >>> import stretchmap as sm
+    >>> found = sm.volume_map(sm.samples.vertebra_like(1500))
+    >>> origin = sm.origin_of(found)
+    >>> origin.coordinates(found.coordinates()).shape == found.image.shape
+    True
+    """
+
+    u: float
+    v: float
+    sign: int
+    sureness: tuple[float, float, float]
+
+    def coordinates(self, given: ArrayLike) -> NDArray[np.float64]:
+        """Coordinates (n, 3) of the map from this origin on, angles in [0, 2 pi)."""
+        uvs = as_points(given, "given")
+        angles = self.sign * (uvs[:, :2] - [self.u, self.v])
+        return np.column_stack([np.mod(angles, _TWO_PI), uvs[:, 2]])
+
+
+def origin_of(result: VolumeMap, landmarks: ArrayLike | None = None) -> Origin:
+    """Fix where u and v of a map to the torus begin.
+
+    Parameters
+    ----------
+    result : VolumeMap
+    landmarks : array_like, shape (2, 3), optional
+        Points of the source: u and v are zero at the first, and u of the second is below pi.
+        Without them the shape decides, see above.
+
+    Returns
+    -------
+    Origin
+
+    Raises
+    ------
+    ArrayError
+        Not two landmarks.
+    LandmarkError
+        A landmark lies outside the solid, ``ids`` say which.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretchmap as sm
+    >>> found = sm.volume_map(sm.samples.vertebra_like(1500))
+    >>> marks = found.mesh.V[found.mesh.boundary_vertices[[0, 40]]]
+    >>> origin = sm.origin_of(found, marks)
+    >>> turn = origin.coordinates(found.coordinates(marks))[0, :2] / (2 * np.pi)
+    >>> bool(np.allclose(turn, np.round(turn)))
+    True
+    """
+    if landmarks is not None:
+        return _by_landmarks(result, landmarks)
+    mesh = result.mesh
+    u, v, _ = result.coordinates(mesh.V[mesh.T].mean(axis=1)).T
+    volumes = mesh.tet_volumes
+    centers = mesh.V[mesh.T].mean(axis=1)
+    reach = volumes * ((centers - volumes @ centers / volumes.sum()) ** 2).sum(axis=1)
+    known = np.isfinite(u)
+    reach = np.where(known, reach, 0.0) / reach[known].sum()
+
+    def moment(angle: NDArray[np.float64], k: int) -> complex:
+        return complex((reach * np.exp(1j * k * np.where(known, angle, 0.0))).sum())
+
+    first = moment(u, 1), moment(v, 1)
+    begin = [float(np.angle(m)) for m in first]
+    odd = max(
+        (moment(a - b, 2).imag for a, b in zip((u, v), begin, strict=True)), key=abs
+    )  # fmt: skip
+    return Origin(
+        begin[0], begin[1], 1 if odd >= 0.0 else -1, (abs(first[0]), abs(first[1]), abs(odd))
+    )
+
+
+def _by_landmarks(result: VolumeMap, landmarks: ArrayLike) -> Origin:
+    points = as_points(landmarks, "landmarks")
+    if len(points) != 2:
+        raise ArrayError(f"two landmarks fix where angles begin and which way, got {len(points)}")
+    found = result.coordinates(points)
+    outside = np.flatnonzero(~np.isfinite(found[:, 0]))
+    if len(outside):
+        raise LandmarkError("a landmark lies outside the solid", outside)
+    ahead = np.mod(found[1, 0] - found[0, 0], _TWO_PI) < np.pi
+    return Origin(float(found[0, 0]), float(found[0, 1]), 1 if ahead else -1, (1.0, 1.0, 1.0))

@@ -1,0 +1,67 @@
+"""Where u and v begin: the same for the same body, however it is meshed and wherever it stands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap.errors import ArrayError, LandmarkError
+
+
+@pytest.fixture(scope="module")
+def found():
+    return sm.volume_map(sm.samples.vertebra_population(1, seed=11, n_tets=1500).solids[0])
+
+
+def apart(one, other):
+    """Median degrees between angles."""
+    return np.degrees(np.nanmedian(np.abs(np.angle(np.exp(1j * (one - other)))), axis=0))
+
+
+def test_a_moved_and_renumbered_body_has_the_same_coordinates(found):
+    solid, random = found.mesh, np.random.default_rng(3)
+    Q = np.linalg.qr(random.standard_normal((3, 3)))[0]
+    Q *= np.sign(np.linalg.det(Q))
+    order = random.permutation(solid.n_vertices)
+    rank = np.argsort(order).astype(np.int32)
+    copy = sm.volume_map(sm.TetMesh(solid.V[order] @ Q.T + 3.0, rank[solid.T]))
+    one = sm.origin_of(found).coordinates(found.coordinates())
+    other = sm.origin_of(copy).coordinates(copy.coordinates(copy.mesh.V[: solid.n_vertices]))
+    assert (apart(one[order, :2], other[:, :2]) < 5.0).all()
+
+
+def test_the_origin_does_not_depend_on_where_the_map_began(found):
+    """Coordinates turned and reversed beforehand come out the same."""
+
+    class Turned:
+        mesh = found.mesh
+
+        @staticmethod
+        def coordinates(points=None):
+            uvs = np.array(found.coordinates(points))
+            uvs[:, 0], uvs[:, 1] = 1.3 - uvs[:, 0], 4.0 - uvs[:, 1]
+            return uvs
+
+    here, there = sm.origin_of(found), sm.origin_of(Turned)
+    assert here.sign == -there.sign and min(here.sureness) > 1e-3
+    one, other = here.coordinates(found.coordinates()), there.coordinates(Turned.coordinates())
+    assert (apart(one[:, :2], other[:, :2]) < 1e-6).all()
+    assert np.allclose(one[:, 2], other[:, 2], equal_nan=True)
+
+
+def test_two_landmarks_decide(found):
+    centers = found.mesh.V[found.mesh.T[[5, 700]]].mean(axis=1)
+    for marks in (centers, centers[::-1]):
+        origin = sm.origin_of(found, marks)
+        uvs = origin.coordinates(found.coordinates(marks))
+        assert np.abs(np.sin(uvs[0, :2] / 2.0)).max() < 1e-9
+        assert uvs[1, 0] < np.pi
+
+
+def test_landmarks_that_decide_nothing_are_named(found):
+    with pytest.raises(ArrayError):
+        sm.origin_of(found, found.mesh.V[:3])
+    with pytest.raises(LandmarkError) as caught:
+        sm.origin_of(found, np.array([found.mesh.V[0], [1e3, 0.0, 0.0]]))
+    assert 1 in caught.value.ids
