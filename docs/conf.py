@@ -27,7 +27,6 @@ html_title = f"stretchmap {release}"
 html_theme_options = {"navigation_with_keys": False, "show_prev_next": False}
 exclude_patterns = [
     "results.md",
-    "robustness.md",
     "release.md",
     "gallery/*.ipynb",
     "gallery/*.py",
