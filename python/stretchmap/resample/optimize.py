@@ -29,7 +29,7 @@ _LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
 _STEPS = 3  # Newton steps between two looks at boxes and samples
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
-_GUARD = 0.3  # hexahedra whose edge triples are all better are judged by their corners alone
+_GUARD = 0.5  # hexahedra whose edge triples are all better are judged by their corners alone
 _PER_SIDE = 3  # samples of a quad, squared
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
@@ -103,18 +103,25 @@ class GridOptimizer:
         """
         if not self._untangle(schedule.untangle, progress):
             return
+        valid = None
         for done, power in enumerate(schedule.powers):
             report(progress, "optimize", done, len(schedule.powers), power=power)
             self._round(power, schedule.fit)
+            if not self._invalid().any():
+                valid = self.V
         for done in range(_INVALID_ROUNDS):
-            invalid = _core.resample.valid_hexes(self.V, self.H) == 0
+            invalid = self._invalid()
             report(progress, "validity", done, _INVALID_ROUNDS, invalid=int(invalid.sum()))
             if not invalid.any():
-                break
+                return
             # Harder on these, and the boundary gives way.
             self._weights[invalid] *= _HARDER
-            self._prepare(_LOOSER ** (done + 1), 0.0)
-            self._step(schedule.powers[-1])
+            self._descend(schedule.powers[-1], _LOOSER ** (done + 1), 0.0)
+        if valid is not None and self._invalid().any():
+            self.V = valid
+
+    def _invalid(self) -> NDArray[np.bool_]:
+        return np.asarray(_core.resample.valid_hexes(self.V, self.H) == 0)
 
     def _untangle(self, rounds: int, progress: Progress | None) -> bool:
         """Whether all edge triples are positive."""
@@ -135,27 +142,44 @@ class GridOptimizer:
 
     def _round(self, power: float, fit: float) -> None:
         # What the shape gains in weight, the fit gains, too.
-        self._prepare(fit * np.sqrt(power), _MOST_BOOST)
-        self._step(power)
+        self._descend(power, fit * np.sqrt(power), _MOST_BOOST)
 
-    def _step(self, power: float) -> None:
-        """Newton steps, after regularized ones if triples guarded from now on are not positive."""
-        for _ in range(_REPAIRS):
-            min_det = self._newton.value(self.V, _corner(1.0)).min_det
+    def _descend(self, power: float, strength: float, boost: float) -> None:
+        """Newton steps under the barrier, which guarded triples have to be inside of first."""
+        self._prepare(strength, boost)
+        if self._min_det() <= 0.0:
+            if not self._repaired():
+                self._guarded &= _core.resample.least_edge_jacobians(self.V, self.H) > 0.0
+            self._prepare(strength, boost, guard=False)
+        if self._min_det() > 0.0:
+            self.V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS)
+
+    def _repaired(self) -> bool:
+        """Whether all guarded triples are positive after regularized steps; undone if not.
+
+        The fit is loose: against one that pulls hard these steps would fold half of the grid.
+        """
+        before = self.V
+        for done in range(_REPAIRS):
+            self._prepare(_LOOSE * _LOOSER**done, 0.0)
+            min_det = self._min_det()
             if min_det > 0.0:
-                break
+                return True
             self._regularized(min_det)
-        else:
-            return
-        self.V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS)
+        self.V = before
+        return False
+
+    def _min_det(self) -> float:
+        return self._newton.value(self.V, _corner(1.0)).min_det
 
     def _regularized(self, min_det: float) -> None:
         epsilon = float(np.clip(-0.5 * min_det, _LEAST_EPSILON, _LARGEST_EPSILON))
         self.V, _ = self._newton.run(self.V, _corner(epsilon), 1.0, _STEPS)
 
-    def _prepare(self, strength: float, boost: float) -> None:
+    def _prepare(self, strength: float, boost: float, guard: bool = True) -> None:
         """Boxes and samples of the boundary for the present points."""
-        self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
+        if guard:
+            self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
         self._newton.set_rest(self._sides(_MEAN), self._weights, self._guarded)
         samples = self._fit.match(self.V)
         factor = 1.0 + np.minimum((samples.distance / self._tolerance) ** 2, boost)
