@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..errors import KindError
+from ..maps.given import as_map_of_solid
 from ..maps.points import PointMap
 from ..mesh.meshes import TetMesh
 
@@ -44,7 +45,8 @@ def inverse_consistency(there: RegistrationLike, back: RegistrationLike) -> NDAr
     Raises
     ------
     KindError
-        ``back`` does not lead back: its source is not B, or its target not A.
+        ``back`` does not lead back: its source is not B, or its target not A; or one of them is no
+        map onto a solid.
 
     Notes
     -----
@@ -62,6 +64,9 @@ def inverse_consistency(there: RegistrationLike, back: RegistrationLike) -> NDAr
     >>> bool(np.nanmedian(sm.inverse_consistency(there, back)) < 0.1)
     True
     """
+    for given in (there, back):
+        if as_map_of_solid(given, "inverse_consistency")[0].target is None:
+            raise KindError("inverse_consistency needs maps onto solids; see register")
     n, m = there.target.n_vertices, back.target.n_vertices
     if not (
         np.array_equal(back.mesh.V[:n], there.target.V)

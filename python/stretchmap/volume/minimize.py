@@ -97,10 +97,10 @@ def minimize(
             return Minimized(x, False, "the time limit was reached", newton)
         weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
         if glide and model.ground is not None:
-            total = float(_core.mesh.tet_volumes(x, model.T).sum())
-            if abs(total - enclosed) > _DRIFT:
-                newton.set_targets(model.inflating(total))
-                enclosed = total
+            volume = float(_core.mesh.tet_volumes(x, model.T).sum())
+            if abs(volume - enclosed) > _DRIFT:
+                newton.set_targets(model.inflating(volume))
+                enclosed = volume
         linear = _core.volume.NewtonOptions(
             tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=sharing.kept > 0
         )
