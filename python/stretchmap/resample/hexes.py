@@ -55,9 +55,9 @@ def hex_mesh(
 ) -> HexMesh:
     """Mesh a solid with hexahedra: a structured grid of the solid torus, pulled back and optimized.
 
-    A map that keeps shape rather than volume is the better start: one made with
-    ``options=VolumeOptions(volume_weight=1)``. Points move a good deal; what stays of the map is
-    which part of the solid belongs to which section, block and layer.
+    A map between shape and volume is the better start: one made with ``balance=0.5``. Points move a
+    good deal; what stays of the map is which part of the solid belongs to which section, block and
+    layer.
 
     Parameters
     ----------
