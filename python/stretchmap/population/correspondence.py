@@ -21,7 +21,7 @@ from ..registration.map import Registration, register
 from ..volume.fill import FillMap, fill
 from ..volume.options import FillOptions
 from .fitting import Fit, Template, fit_surface
-from .pose import rigid_poses
+from .pose import rigid_poses, same_pose
 from .procrustes import Similarity, similarity_onto
 
 __all__ = ["Correspondence", "correspond"]
@@ -209,19 +209,13 @@ def _smooth(
     volume_weight: float,
 ) -> tuple[FillMap | None, Array, float, str]:
     """The smooth map, or why there is none; the deformation, its distance from the surface."""
-    surface = template.solid.surface
-    if start is not None:
-        poses = [similarity_onto(surface.V, start)]
-    elif landmarks is not None and template.anchors is not None and len(landmarks) >= 3:
-        poses = [similarity_onto(template.anchors.at(surface.V, surface.F), landmarks)]
-    else:
-        poses = rigid_poses(surface, solid.surface)
-    if len(poses) > 1:
-        coarse = [_fitted(template, solid, pose, start, landmarks, True).energy for pose in poses]
-        poses = [p for p, e in zip(poses, coarse, strict=True) if e <= _NEARLY * min(coarse)]
-    fits = [_fitted(template, solid, pose, start, landmarks) for pose in poses]
+    starts = _starts(template, solid, start, landmarks)
+    if len(starts) > 1:
+        coarse = [_fitted(template, solid, *s, landmarks, True).energy for s in starts]
+        starts = [s for s, e in zip(starts, coarse, strict=True) if e <= _NEARLY * min(coarse)]
+    fits = [_fitted(template, solid, *s, landmarks) for s in starts]
     best = min(range(len(fits)), key=lambda i: fits[i].energy)
-    pose, fitted = poses[best], fits[best]
+    pose, fitted = starts[best][0], fits[best]
     distance = fitted.distance / template.spline.length
     goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)
     points, moved = _settled(template, goal, fitted.projected), pose(fitted.points)
@@ -236,6 +230,26 @@ def _smooth(
     except (MeshError, SolverError) as error:
         reason = str(error)
     return None, moved, distance, f"smooth correspondence given up: {reason}"
+
+
+def _starts(
+    template: Template, solid: TetMesh, start: Array | None, landmarks: Array | None
+) -> list[tuple[Similarity, Array | None]]:
+    """Poses of the template on the solid, with where its boundary vertices go about, if known.
+
+    A start without landmarks is doubted: it may come from a template so unlike the solid that
+    another pose needed less bending, which from an average does not.
+    """
+    surface = template.solid.surface
+    if start is not None:
+        pose = similarity_onto(surface.V, start)
+        if landmarks is not None:
+            return [(pose, start)]
+        others = rigid_poses(surface, solid.surface)
+        return [(pose, start), *((p, None) for p in others if not same_pose(p, pose))]
+    if landmarks is not None and template.anchors is not None and len(landmarks) >= 3:
+        return [(similarity_onto(template.anchors.at(surface.V, surface.F), landmarks), None)]
+    return [(pose, None) for pose in rigid_poses(surface, solid.surface)]
 
 
 def _eased(template: Template, goal: TriMesh, points: Array, found: FillMap) -> Array:

@@ -10,7 +10,7 @@ from .. import _core
 from ..mesh.meshes import TriMesh
 from .procrustes import Similarity
 
-__all__ = ["rigid_poses"]
+__all__ = ["rigid_poses", "same_pose"]
 
 _FEW, _MANY = 80, 250  # faces of either surface that are compared, at first and then
 _FIRST, _KEPT, _LAST = 5, 8, 30  # steps of every start, starts that go on, and steps of those
@@ -41,6 +41,11 @@ class _Samples:
     def feet(self, points: Array) -> Array:
         """Closest points of the surface."""
         return np.asarray(self.tree.closest(np.ascontiguousarray(points))[0])
+
+
+def same_pose(one: Similarity, other: Similarity) -> bool:
+    """Whether two poses turn a body nearly the same way."""
+    return bool(np.einsum("ij,ij->", one.rotation, other.rotation) > _SAME)
 
 
 def rigid_poses(moving: TriMesh, goal: TriMesh) -> list[Similarity]:

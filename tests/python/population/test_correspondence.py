@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import stretchmap as sm
 from population.truth import correspondence_errors, size
@@ -13,6 +14,7 @@ from stretchmap.population import correspond
 from stretchmap.population.correspondence import _eased
 from stretchmap.population.fitting import Anchors, Template, fit_surface
 from stretchmap.population.pose import rigid_poses
+from stretchmap.population.procrustes import similarity_onto
 from stretchmap.population.thin_plate import ThinPlate
 
 
@@ -110,3 +112,25 @@ def test_only_what_is_beside_inverted_tets_is_evened_out(bones):
     near = np.isin(solid.boundary_vertices, solid.T[inverted])
     ring = template.ring_mean @ near.astype(float) > 0.0
     assert moved[near].any() and not moved[~(near | ring)].any()
+
+
+@pytest.mark.parametrize("individual", [1, 7])
+def test_a_start_a_third_of_a_turn_off_is_not_believed(individual):
+    """Seen from an average, the right pose needs less bending; that round it is taken."""
+    bones = sm.samples.vertebra_population(8, seed=5, n_tets=3000)
+    template, solid = bones.reference, bones.solids[individual]
+    turn = Rotation.from_matrix(
+        bones.poses[individual][:3] / np.cbrt(np.linalg.det(bones.poses[individual][:3]))
+    )
+    center = template.V.mean(axis=0)
+    axis = np.linalg.svd(template.surface.V - center, full_matrices=False)[2][2]
+    third = Rotation.from_rotvec(2.0 * np.pi / 3.0 * axis)
+    wrong = turn.inv().apply(third.apply(template.surface.V - center))
+    wrong += solid.V.mean(axis=0)
+    begun, found = correspond(template, solid, start=wrong), correspond(template, solid)
+    assert begun.along == found.along == "smooth"
+    gap = np.linalg.norm(begun.smooth - found.smooth, axis=1)
+    assert np.median(gap) < 0.02 * size(solid.V)
+    lie = similarity_onto(template.V, begun.smooth).rotation
+    true = turn.inv().as_matrix().T
+    assert np.trace(lie.T @ true) > 2.5
