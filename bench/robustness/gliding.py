@@ -121,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
                 f"{found['processor_seconds']:.1f}",
                 flush=True,
             )
-    text = table(records)
+    text = f"{len(pairs)} of {len(files) * (len(files) - 1)} pairs.\n\n{table(records)}"
     for way in WAYS:
         rows = consistency(pairs, way, out)
         if len(rows):
