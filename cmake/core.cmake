@@ -37,8 +37,7 @@ set(wide cpp/src/volume/tet_weights.cpp cpp/src/volume/tet_weights_avx2.cpp
          cpp/src/linalg/direct/block_update.cpp)
 if(NOT MSVC)
   set_source_files_properties(
-    ${wide} PROPERTIES COMPILE_OPTIONS -ffp-contract=off SKIP_PRECOMPILE_HEADERS ON
-                       SKIP_UNITY_BUILD_INCLUSION ON)
+    ${wide} PROPERTIES COMPILE_OPTIONS -ffp-contract=off SKIP_PRECOMPILE_HEADERS ON)
   if(x86)
     set_source_files_properties(cpp/src/volume/tet_weights_avx2.cpp PROPERTIES
                                 COMPILE_OPTIONS "-ffp-contract=off;-mavx2")
@@ -47,13 +46,9 @@ if(NOT MSVC)
   endif()
 endif()
 
-# With CMAKE_UNITY_BUILD, one unit per room.
-set_target_properties(stretchmap_core PROPERTIES UNITY_BUILD_MODE GROUP)
-foreach(source ${core_sources})
-  file(RELATIVE_PATH room "${CMAKE_SOURCE_DIR}/cpp/src" "${source}")
-  string(REGEX REPLACE "/.*" "" room "${room}")
-  set_source_files_properties("${source}" PROPERTIES UNITY_GROUP ${room})
-endforeach()
+# Rooms have names of their own in several files, so the core is compiled file by file even with
+# CMAKE_UNITY_BUILD, which wheels use for the bindings.
+set_target_properties(stretchmap_core PROPERTIES UNITY_BUILD OFF)
 
 if(STRETCHMAP_OPENMP)
   find_package(OpenMP COMPONENTS CXX)
