@@ -50,6 +50,7 @@ void bind(py::module_& m);
 PYBIND11_MODULE(_core, m) {
   m.doc() = "C++ core of stretchmap; private, its arguments are validated by the Python layer.";
 
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): the signature is pybind11's.
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) std::rethrow_exception(pointer);
