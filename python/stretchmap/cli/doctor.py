@@ -17,7 +17,7 @@ from .common import Json, Quiet
 _EXTRAS = {
     "cli": ("typer", "rich"),
     "io": ("meshio", "h5py"),
-    "prepare": ("gpytoolbox", "scikit-image", "pytetwild"),
+    "prepare": ("gpytoolbox", "scikit-image", "pytetwild", "pyvista"),
     "mesh": ("tetgen", "scikit-image"),
     "nifti": ("nibabel",),
     "interop": ("pyvista", "trimesh", "meshio"),

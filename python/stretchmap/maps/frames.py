@@ -155,9 +155,10 @@ def without_jump(
     Examples
     --------
     >>> import numpy as np
-    >>> values, single = without_jump(np.array([0.1, 6.2, 3.0]), np.array([[0, 1], [1, 2]]))
+    >>> angles = np.array([0.1, 6.2, 2.2, 4.4])
+    >>> values, single = without_jump(angles, np.array([[0, 1, 0], [0, 2, 3]]))
     >>> values.round(3).tolist(), single.tolist()
-    ([[0.1, -0.083], [6.2, 3.0]], [True, False])
+    ([[0.1, -0.083, 0.1], [0.1, 2.2, -1.883]], [True, False])
     """
     corners = np.asarray(angles, float)[elements]
     first = corners[:, :1] % TWO_PI

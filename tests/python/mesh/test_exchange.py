@@ -76,6 +76,7 @@ def test_maps_take_them_all(surface, solid):
 
 def test_fields_of_a_map_go_along():
     pytest.importorskip("pyvista")
+    pytest.importorskip("trimesh")
     pytest.importorskip("meshio")
     result = sm.volume_map(samples.solid_torus(600))
     u, v, s = result.coordinates().T
