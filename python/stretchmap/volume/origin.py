@@ -8,22 +8,20 @@ decide, or the shape: with x the place of a tet in the body, c the body's center
 u begins at the phase of M_1(u), the direction round the hole in which the body reaches farthest,
 and v at the phase of M_1(v). Both angles may be reversed together, and nothing else keeps
 orientation: they run so that the imaginary part of the larger of the second moments, M_2(u) and
-M_2(v) taken from there, is positive. Being integrals, they hardly change with the mesh.
+M_2(v) taken from there, is positive. A body with a mirror plane leaves that sign open.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import as_points
 from ..errors import ArrayError, LandmarkError
-
-if TYPE_CHECKING:
-    from .map import VolumeMap
+from ..maps.given import as_map_of_solid
+from ..maps.result import MapResult
 
 __all__ = ["Origin", "origin_of"]
 
@@ -66,12 +64,13 @@ class Origin:
         return np.column_stack([np.mod(angles, _TWO_PI), uvs[:, 2]])
 
 
-def origin_of(result: VolumeMap, landmarks: ArrayLike | None = None) -> Origin:
+def origin_of(result: MapResult, landmarks: ArrayLike | None = None) -> Origin:
     """Fix where u and v of a map to the torus begin.
 
     Parameters
     ----------
-    result : VolumeMap
+    result : MapResult
+        Of a solid, to a torus, as from `volume_map` or `load_map`.
     landmarks : array_like, shape (2, 3), optional
         Points of the source: u and v are zero at the first, and u of the second is below pi.
         Without them the shape decides, see above.
@@ -82,6 +81,10 @@ def origin_of(result: VolumeMap, landmarks: ArrayLike | None = None) -> Origin:
 
     Raises
     ------
+    KindError
+        No map of a solid.
+    OptionError
+        The map goes to no torus.
     ArrayError
         Not two landmarks.
     LandmarkError
@@ -98,10 +101,10 @@ def origin_of(result: VolumeMap, landmarks: ArrayLike | None = None) -> Origin:
     >>> bool(np.allclose(turn, np.round(turn)))
     True
     """
+    mapped, mesh = as_map_of_solid(result, "where u and v begin")
     if landmarks is not None:
-        return _by_landmarks(result, landmarks)
-    mesh = result.mesh
-    u, v, _ = result.coordinates(mesh.V[mesh.T].mean(axis=1)).T
+        return _by_landmarks(mapped, landmarks)
+    u, v, _ = mapped.coordinates(mesh.V[mesh.T].mean(axis=1)).T
     volumes = mesh.tet_volumes
     centers = mesh.V[mesh.T].mean(axis=1)
     reach = volumes * ((centers - volumes @ centers / volumes.sum()) ** 2).sum(axis=1)
@@ -121,7 +124,7 @@ def origin_of(result: VolumeMap, landmarks: ArrayLike | None = None) -> Origin:
     )
 
 
-def _by_landmarks(result: VolumeMap, landmarks: ArrayLike) -> Origin:
+def _by_landmarks(result: MapResult, landmarks: ArrayLike) -> Origin:
     points = as_points(landmarks, "landmarks")
     if len(points) != 2:
         raise ArrayError(f"two landmarks fix where angles begin and which way, got {len(points)}")
