@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stretchmap/volume/line_bound.hpp"
 #include "stretchmap/volume/solid_energy.hpp"
 
 namespace stretchmap::volume {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // What is taken of the way to where a tet turns over, and so how far ahead that has to be looked
@@ -15,25 +15,6 @@ using Eigen::Vector3d;
 constexpr double kShare = 0.9, kWholeStep = 1.0 / kShare;
 constexpr int kHoldingPasses = 6;
 constexpr double kEasing = 0.25;  // what is left of a step at the vertices of an element it harms
-
-// Smallest root in (0, limit] of d0 + d1 a + d2 a^2 + d3 a^3 with d0 > 0; limit if there is none.
-double first_root(double d0, double d1, double d2, double d3, double limit) {
-  const auto p = [&](double a) { return d0 + a * (d1 + a * (d2 + a * d3)); };
-  // Bernstein coefficients on [0, limit]: all positive means no root.
-  const double b1 = d0 + d1 * limit / 3.0;
-  const double b2 = d0 + 2.0 * d1 * limit / 3.0 + d2 * limit * limit / 3.0;
-  if (b1 > 0 && b2 > 0 && p(limit) > 0) return limit;
-  // March with a Lipschitz bound of the derivative: never steps over a root.
-  const double bound = std::abs(d1) + limit * (2.0 * std::abs(d2) + 3.0 * limit * std::abs(d3));
-  double a = 0.0;
-  for (int k = 0; k < 64; ++k) {
-    const double value = p(a);
-    if (value <= 1e-3 * d0) return a;
-    a += value / bound;
-    if (a >= limit) return limit;
-  }
-  return a;
-}
 
 }  // namespace
 
@@ -66,38 +47,14 @@ Points SolidEnergy::in_space(const PointsRef& x, const PointsRef& step) const {
   return direction;
 }
 
-Vec SolidEnergy::longest_steps(const PointsRef& x, const PointsRef& direction) const {
-  const Index k = static_cast<Index>(tets_.rows());
-  Vec longest = Vec::Constant(k, kWholeStep);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
-    Matrix3d E, D;
-    for (int a = 1; a < 4; ++a) {
-      E.col(a - 1) = x.row(tets_(t, a)) - x.row(tets_(t, 0));
-      D.col(a - 1) = direction.row(tets_(t, a)) - direction.row(tets_(t, 0));
-    }
-    const double d0 = E.determinant();
-    if (!(d0 > 0.0)) continue;
-    const auto det = [](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-      return a.dot(b.cross(c));
-    };
-    const double d1 = det(D.col(0), E.col(1), E.col(2)) + det(E.col(0), D.col(1), E.col(2)) +
-                      det(E.col(0), E.col(1), D.col(2));
-    const double d2 = det(D.col(0), D.col(1), E.col(2)) + det(D.col(0), E.col(1), D.col(2)) +
-                      det(E.col(0), D.col(1), D.col(2));
-    longest[t] = first_root(d0, d1, d2, D.determinant(), kWholeStep);
-  }
-  return longest;
-}
-
 double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) const {
-  return std::min(1.0, kShare * longest_steps(x, in_space(x, step)).minCoeff());
+  return std::min(1.0, kShare * longest_steps(tets_, x, in_space(x, step), kWholeStep).minCoeff());
 }
 
 Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
   Points direction = in_space(x, step), shortened = step;
   for (int pass = 0; pass < kHoldingPasses; ++pass) {
-    const Vec longest = longest_steps(x, direction);
+    const Vec longest = longest_steps(tets_, x, direction, kWholeStep);
     Vec share = Vec::Ones(x.rows());
     bool held = false;
     for (Index t = 0; t < longest.size(); ++t) {

@@ -88,7 +88,6 @@ class SolidEnergy {
   GlideSites sites(const PointsRef& x, bool derivatives) const;
   Eigen::Matrix3d frame(const GlideSites& sites, Index vertex) const;
   Points in_space(const PointsRef& x, const PointsRef& step) const;  // (n, 3) of a step in frames
-  Vec longest_steps(const PointsRef& x, const PointsRef& direction) const;  // of every tet
   // visit(t, lane, batch) for the tets t = item(p), p in [first, last), after evaluate(batch, w).
   template <class Item, class Visit>
   void for_batches(const PointsRef& x, const EnergyWeights& w, Index first, Index last,
