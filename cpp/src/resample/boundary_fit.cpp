@@ -15,8 +15,8 @@ constexpr Index kSamplesPerChunk = 512;
 
 BoundaryFit::BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
                          const IndexVecRef& sample_faces, const PointsRef& sample_weights,
-                         const TetsRef& quads, int per_side)
-    : surface_(points, faces), normals_(normals), quads_(quads), per_side_(per_side) {
+                         const TetsRef& quads, int per_side, double far)
+    : surface_(points, faces), normals_(normals), quads_(quads), per_side_(per_side), far_(far) {
   const Index s = static_cast<Index>(sample_faces.size());
   sites_.setZero(s, 3);
   site_normals_.resize(s, 3);
@@ -30,6 +30,15 @@ BoundaryFit::BoundaryFit(const PointsRef& points, const FacesRef& faces, const P
 RowVector3d BoundaryFit::normal(Index face, const Vector3d& weights) const {
   RowVector3d sum = RowVector3d::Zero();
   for (int c = 0; c < 3; ++c) sum += weights[c] * normals_.row(surface_.faces()(face, c));
+  return sum.normalized();
+}
+
+// A short gap has the normal's direction but for rounding and the faces' edges; a long one, from a
+// tip the grid does not reach to its end, has not, and tangent planes of the tip's sides would hold
+// nothing.
+RowVector3d BoundaryFit::direction(const RowVector3d& normal, const RowVector3d& gap) const {
+  const double t = gap.squaredNorm() / (gap.squaredNorm() + far_ * far_);
+  const RowVector3d sum = (1.0 - t) * normal + (gap.dot(normal) < 0.0 ? -t : t) * gap.normalized();
   return sum.normalized();
 }
 
@@ -51,6 +60,7 @@ FitSamples BoundaryFit::match(const PointsRef& x) const {
 
 void BoundaryFit::match_quads(const PointsRef& x, FitSamples& out) const {
   const Index n = static_cast<Index>(quads_.rows()), per = per_side_ * per_side_;
+  const double step = 1.0 / (per_side_ - 1);
   for_chunks(
       n,
       [&](Index begin, Index end) {
@@ -60,8 +70,7 @@ void BoundaryFit::match_quads(const PointsRef& x, FitSamples& out) const {
           const double area = 0.5 * d1.cross(d2).norm();
           Index hint = 0;
           for (Index k = 0; k < per; ++k) {
-            const double s = (k % per_side_ + 0.5) / per_side_,
-                         t = (k / per_side_ + 0.5) / per_side_;
+            const double s = (k % per_side_) * step, t = (k / per_side_) * step;
             const RowVector4d w((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t);
             Vector3d here = Vector3d::Zero();
             for (int c = 0; c < 4; ++c) here += w[c] * x.row(quads_(b, c)).transpose();
@@ -71,7 +80,8 @@ void BoundaryFit::match_quads(const PointsRef& x, FitSamples& out) const {
             out.corners.row(j) = quads_.row(b);
             out.weights.row(j) = w;
             out.point.row(j) = foot.point.transpose();
-            out.normal.row(j) = normal(foot.face, foot.weights);
+            out.normal.row(j) =
+                direction(normal(foot.face, foot.weights), here.transpose() - out.point.row(j));
             out.distance[j] = std::sqrt(foot.squared_distance);
             out.share[j] = area / per;
           }
@@ -112,7 +122,8 @@ void BoundaryFit::match_surface(const PointsRef& x, FitSamples& out) const {
           out.corners.row(j) = quads_.row(quad);
           out.weights.row(j) = w;
           out.point.row(j) = sites_.row(i);
-          out.normal.row(j) = site_normals_.row(i);
+          out.normal.row(j) =
+              direction(site_normals_.row(i), foot.point.transpose() - sites_.row(i));
           out.distance[j] = std::sqrt(foot.squared_distance);
           out.share[j] = facing.dot(site_normals_.row(i)) > 0.0 ? 1.0 / s : 0.0;
         }

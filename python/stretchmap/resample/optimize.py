@@ -29,8 +29,11 @@ _LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
 _STEPS = 3  # Newton steps between two looks at boxes and samples
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
+_PULL = 0.3  # share of the way to the mean size, in logarithms, that boxes grow or shrink ...
+_MOST_PULL = 0.4  # ... at most by this
 _GUARD = 0.5  # hexahedra whose edge triples are all better are judged by their corners alone
-_PER_SIDE = 3  # samples of a quad, squared
+_PER_SIDE = 3  # samples of a quad, squared, its corners among them
+_FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
 _TOLERANCE = 0.005  # of the diagonal: larger gaps count more and more ...
@@ -89,13 +92,13 @@ class GridOptimizer:
         self._counts = np.bincount(H.ravel(), minlength=len(V))
         self._newton = _core.resample.HexNewton(H, len(V))
         quads = boundary_quads(H)
-        count = _PER_SIDE**2 * len(quads)
+        self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
         self._fit = _core.resample.BoundaryFit(
-            surface.V, surface.F, vertex_normals(surface), *_spread(surface, count), quads,
-            _PER_SIDE,
+            surface.V, surface.F, vertex_normals(surface),
+            *_sites(surface, _PER_SIDE**2 * len(quads)), quads, _PER_SIDE, _FAR * self._tolerance,
         )  # fmt: skip
         self._strength = _FIT * len(quads) / surface.area
-        self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
+        self._log_size = np.log(_core.resample.hex_volumes(V, H).sum() / len(H)) / 3.0
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
 
@@ -192,11 +195,15 @@ class GridOptimizer:
         self._newton.set_fit(samples, strength * self._strength * samples.share * factor)
 
     def _sides(self, mean: float) -> NDArray[np.float64]:
-        """(k, 24) sides of the corners' boxes: their own edges, or a share of local means."""
+        """(k, 24) sides of the corners' boxes: their own edges, drawn to local means, and hexahedra
+        to the mean size."""
         own = _core.resample.corner_sides(self.V, self.H)
         logs = np.log(np.maximum(own, 1e-12 * own.max()))
         if mean > 0.0:
-            logs += mean * (self._mean_sides()[:, DIRECTIONS.ravel()] - logs)
+            means = self._mean_sides()
+            logs += mean * (means[:, DIRECTIONS.ravel()] - logs)
+            pull = _PULL * (self._log_size - means.mean(axis=1))
+            logs += np.clip(pull, -_MOST_PULL, _MOST_PULL)[:, None]
         return np.ascontiguousarray(np.exp(logs))
 
     def _mean_sides(self) -> NDArray[np.float64]:
@@ -214,6 +221,16 @@ class GridOptimizer:
 
 def _corner(epsilon: float) -> _core.volume.EnergyWeights:
     return _core.volume.EnergyWeights(1.0, _VOLUME_WEIGHT, epsilon)
+
+
+def _sites(surface: TriMesh, count: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Points spread over the surface, and its vertices, which are where it is farthest out."""
+    faces, weights = _spread(surface, count)
+    used = np.unique(surface.F.ravel(), return_index=True)[1]
+    return (
+        np.concatenate([faces, (used // 3).astype(np.int32)]),
+        np.concatenate([weights, np.eye(3)[used % 3]]),
+    )
 
 
 def _spread(surface: TriMesh, count: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

@@ -28,7 +28,7 @@ def a_fit(H):
     faces = np.arange(0, surface.n_faces, 3, dtype=np.int32)
     weights = np.full((len(faces), 3), 1.0 / 3.0)
     quads = boundary_quads(H)
-    return _core.resample.BoundaryFit(surface.V, surface.F, normals, faces, weights, quads, 2)
+    return _core.resample.BoundaryFit(surface.V, surface.F, normals, faces, weights, quads, 2, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -67,6 +67,35 @@ def test_samples_lie_on_both_surfaces():
     assert matched.share[:first].sum() == pytest.approx(1.0)
     assert matched.share[first:].sum() == pytest.approx(1.0)
     assert 0.0 < matched.distance.max() < 0.5
+
+
+def test_a_tip_beyond_the_grid_pulls_along_itself():
+    """Points of its sides do, too, though their tangent planes hold the grid already."""
+    cube = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+    )
+    one, quads = np.arange(8, dtype=np.int32)[None], boundary_quads(np.arange(8)[None])
+    walls = quads[2:]
+    F = np.ascontiguousarray(np.concatenate([walls[:, [0, 1, 2]], walls[:, [0, 2, 3]]]), np.int32)
+    outward = np.where(cube[:, :2] > 0.5, 1.0, -1.0) / np.sqrt(2.0)
+    normals = np.ascontiguousarray(np.column_stack([outward, np.zeros(8)]))
+    taller = cube * [1.0, 1.0, 3.0]
+    faces, which = np.nonzero(cube[F, 2] > 0.5)
+    weights = np.ascontiguousarray(np.eye(3)[which])
+    pulls = []
+    for far in (1e-3, 1e3):
+        fit = _core.resample.BoundaryFit(
+            taller, F, normals, faces.astype(np.int32), weights,
+            quads.astype(np.int32), 2, far,
+        )  # fmt: skip
+        samples_ = fit.match(1.0 * cube)
+        newton = _core.resample.HexNewton(one, 8)
+        newton.set_rest(np.ones((1, 24)), np.ones(1), np.zeros(1, bool))
+        newton.set_fit(samples_, np.where(samples_.distance > 1.0, samples_.share, 0.0))
+        gradient = newton.model(1.0 * cube, _core.volume.EnergyWeights(1.0, 0.1, 0.0), 1.0)[0]
+        pulls.append(-gradient[4:, 2].sum())
+    assert pulls[0] == pytest.approx(4.0, rel=1e-3)  # 2 times a gap of 2
+    assert abs(pulls[1]) < 1e-3
 
 
 def test_newton_steps_untangle_and_never_raise_the_energy():

@@ -4,7 +4,8 @@
 //
 // over samples j of both: points of each boundary quad against the closest points of the surface,
 // and points of the surface against the closest ones of the grid. n_j is the normal of the surface,
-// so that points of the grid glide along it at no cost (distance to the tangent plane). Quads are
+// so that points of the grid glide along it at no cost (distance to the tangent plane), turned the
+// more into the direction of the gap the longer that is. Quads are
 // bilinear; to find their closest points each is replaced by four triangles with its center.
 #pragma once
 
@@ -32,10 +33,12 @@ class BoundaryFit {
   // \param sample_faces,sample_weights samples of it by face (s) and barycentric coordinates (s,
   // 3),
   //        each standing for the same area.
-  // \param quads (q, 4) of the grid, seen from outside; per_side^2 samples are taken of each.
+  // \param quads (q, 4) of the grid, seen from outside; per_side^2 samples are taken of each,
+  //        corners among them, per_side > 1.
+  // \param far gaps this long are closed half-way between the normal and their own direction.
   BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
               const IndexVecRef& sample_faces, const PointsRef& sample_weights,
-              const TetsRef& quads, int per_side);
+              const TetsRef& quads, int per_side, double far);
 
   // \param x points of the grid.
   // \return their samples.
@@ -43,6 +46,8 @@ class BoundaryFit {
 
  private:
   Eigen::RowVector3d normal(Index face, const Eigen::Vector3d& weights) const;
+  Eigen::RowVector3d direction(const Eigen::RowVector3d& normal,
+                               const Eigen::RowVector3d& gap) const;
   void match_quads(const PointsRef& x, FitSamples& out) const;
   void match_surface(const PointsRef& x, FitSamples& out) const;
 
@@ -51,6 +56,7 @@ class BoundaryFit {
   Points sites_, site_normals_;
   Tets quads_;
   int per_side_;
+  double far_;
 };
 
 }  // namespace stretchmap::resample
