@@ -436,6 +436,9 @@ def _result(
     clock = time.perf_counter()
     certificate = certify(problem.solid, image, torus)
     seconds = {**outcome.seconds, "certificate": time.perf_counter() - clock}
+    converged, stop_reason = outcome.converged, outcome.stop_reason
+    if method == "certified" and converged and not certificate.certified:
+        converged, stop_reason = False, f"{stop_reason}, but {certificate.reason}"
     boundary_map = start if isinstance(start, AreaMap) else None
     if boundary_map is not None:
         seconds = {"boundary": sum(boundary_map.seconds.values()), **seconds}
@@ -449,8 +452,8 @@ def _result(
         refinement=refinement if refinement is not None and refinement.n_split else None,
         history=outcome.history,
         certificate=certificate,
-        converged=outcome.converged,
-        stop_reason=outcome.stop_reason,
+        converged=converged,
+        stop_reason=stop_reason,
         seconds=seconds,
         vertex_exact=outcome.vertex_exact,
     )

@@ -10,6 +10,7 @@ import pytest
 import stretchmap as sm
 from stretchmap.area.map import finished
 from stretchmap.volume import map as volume_module
+from stretchmap.volume.boundary_starts import boundary_starts
 from stretchmap.volume.minimize import minimize
 from stretchmap.volume.model import GLIDING, Budget, History
 from stretchmap.volume.options import VolumeOptions
@@ -68,24 +69,46 @@ def test_a_needle_mesh_has_no_slivers(problem):
     assert (stretched.roomy_volumes == stretched.local_volumes).all()
 
 
-def test_another_start_is_tried_where_one_fails(monkeypatch):
-    tried = []
+def failing(monkeypatch, times: int) -> list[np.ndarray]:
+    """Lets the first solves end with inverted tets, and lists the images all began with."""
+    tried: list[np.ndarray] = []
     solve = volume_module.solve
 
-    def fails_once(problem, options, **keywords):
+    def fails(problem, options, **keywords):
         tried.append(problem.x.copy())
         found = solve(problem, options, **keywords)
-        if len(tried) == 1:
+        if len(tried) <= times:
             x = found.problem.x.copy()
             x[np.setdiff1d(np.arange(len(x)), problem.solid.boundary_vertices)] *= -1.0
             return dataclasses.replace(found, problem=dataclasses.replace(found.problem, x=x))
         return found
 
-    monkeypatch.setattr(volume_module, "solve", fails_once)
+    monkeypatch.setattr(volume_module, "solve", fails)
+    return tried
+
+
+def test_another_start_is_tried_where_one_fails(monkeypatch):
+    tried = failing(monkeypatch, 1)
     result = sm.volume_map(SOLID)
     assert len(tried) == 2 and (tried[0] != tried[1]).any()
     assert result.certificate.certified and result.distortion.flips == 0
     assert result.seconds["other starts"] > 0.0
+
+
+def test_what_is_not_certified_has_not_converged(monkeypatch):
+    failing(monkeypatch, 9)
+    result = sm.volume_map(SOLID, keep_best=True)
+    assert not result.certificate.certified
+    assert not result.converged and result.certificate.reason in result.stop_reason
+
+
+def test_the_first_start_has_no_folded_face_if_that_can_be_had():
+    solid = sm.samples.vertebra_like(600)
+    plain = sm.area_map(solid.surface, finish="none", ratio="search")
+    assert not plain.certificate.certified  # or there is nothing to choose
+    starts = list(boundary_starts(solid, VolumeOptions(), glide=True, progress=None))
+    assert [start.certificate.certified for start in starts] == [True, True, False]
+    assert (starts[2].angles == plain.angles).all()
 
 
 def test_an_unfinished_area_map_can_be_finished():
