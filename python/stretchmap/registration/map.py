@@ -166,10 +166,11 @@ def register(
         `read_landmarks`). Points are moved to the nearest boundary vertex; the result says how far.
     boundary : {"glide", "frozen"}
         ``"glide"``: boundary vertices, but for landmarks, move on the target's surface until
-        volumes are kept below it as they are inside. ``"frozen"``: they stay where the matching of
+        volumes are kept below it as they are inside, and no farther (``glide_std`` and
+        ``glide_distortion`` of `FillOptions`). ``"frozen"``: they stay where the matching of
         the surfaces put them, which is closer to where a smooth deformation that does not keep
-        volumes would. A map that gliding would make cross itself is kept frozen; the result says
-        which it is.
+        volumes would. A map that need not glide, or that gliding would make cross itself, is kept
+        frozen; the result says which it is.
     landmark_map : {"smooth", "affine"}
         How landmarks are reached after the surfaces were matched for least distortion of area and
         shape. ``"smooth"``: by the same matching with the landmarks held, kept free of folds by a

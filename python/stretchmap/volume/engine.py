@@ -272,15 +272,17 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
 
 
 def _glided_on_mesh(run: _Run) -> Outcome:
-    """With the boundary gliding on a mesh; held, if that makes it cross itself."""
+    """With the boundary gliding on a mesh; held, if it need not, or that makes it cross itself."""
     o, history = run.options, run.history
     weight = min(o.frozen_weight, o.volume_weight)
     with run.timed("frozen"):
         run.x = minimize(
             history.model, run.x, history, glide=False, start=min(1.0, weight), goal=weight
         ).x
-    with run.timed("glide"):
-        done = glide_on_mesh(run.problem, o, history, start=weight)
+    needless, done = history.model.kept(run.x), None
+    if not needless:
+        with run.timed("glide"):
+            done = glide_on_mesh(run.problem, o, history, start=weight)
     glided = done is not None
     if done is None:
         run.take(run.problem)
@@ -288,7 +290,8 @@ def _glided_on_mesh(run: _Run) -> Outcome:
             done = minimize(
                 history.model, run.x, history, glide=False, start=weight, goal=o.volume_weight
             )
-        _log.warning("the boundary is held: gliding makes its image cross itself")
+        if not needless:
+            _log.warning("the boundary is held: gliding makes its image cross itself")
     run.x = done.x
     outcome = _outcome(run, done.converged, done.reason)
     return dataclasses.replace(outcome, glided=glided)

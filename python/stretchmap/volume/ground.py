@@ -26,6 +26,8 @@ _log = logging.getLogger("stretchmap")
 
 _TRIES, _RELEASES = 4, 2
 _MOST_PAIRS = 10_000
+# What is amiss far apart is mended by moving all between, which a coarse solve hardly sees.
+_CG_TOL = 0.01
 
 
 def glide_on_mesh(
@@ -48,6 +50,7 @@ def glide_on_mesh(
     Minimized or None
         As certifiable as what was given; None if the boundary crosses itself, whatever is held.
     """
+    options = dataclasses.replace(options, cg_tol=min(options.cg_tol, _CG_TOL))
     x, first = problem.x, start
     held, found = _folded(problem, options, x), None
     tries = releases = 0
@@ -64,6 +67,8 @@ def glide_on_mesh(
             held, tries = np.union1d(held, crossing), tries + 1
             continue
         found, x = done, done.x
+        if history.model.kept(x):
+            break
         still = np.intersect1d(_folded(problem, options, x), held)
         if len(still) == len(held) or releases == _RELEASES or history.budget.spent:
             break

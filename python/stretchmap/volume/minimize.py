@@ -87,7 +87,7 @@ def minimize(
     o = model.options
     stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
     tolerance = o.glide_tol if glide else o.frozen_tol
-    face = o.face_weight if glide else 0.0
+    face, on_mesh = o.face_weight if glide else 0.0, glide and model.ground is not None
     newton = model.newton(x, glide=glide)
     if not glide:
         newton.set_targets(model.targets)
@@ -96,7 +96,7 @@ def minimize(
         if history.budget.spent:
             return Minimized(x, False, "the time limit was reached", newton)
         weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
-        if glide and model.ground is not None:
+        if on_mesh:
             volume = float(_core.mesh.tet_volumes(x, model.T).sum())
             if abs(volume - enclosed) > _DRIFT:
                 newton.set_targets(model.inflating(volume))
@@ -112,6 +112,8 @@ def minimize(
         # A step that few tets cut short, or from a poor solve, gains little and proves nothing.
         predicted = 0.5 * step.decrement / weight
         small = max(before - after, predicted) <= tolerance * before and not step.negative_curvature
+        if on_mesh and model.kept(x):
+            return Minimized(x, True, "volumes are kept", newton)
         if weight < goal:
             if step.alpha >= 0.5:
                 weight = min(goal, o.growth * weight)

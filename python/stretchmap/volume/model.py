@@ -159,6 +159,14 @@ class SolidModel:
         asked = enclosed + missing * yielding / float(self.shares @ yielding)
         return np.asarray(np.maximum(asked, 0.5 * enclosed))
 
+    def kept(self, x: NDArray[np.float64]) -> bool:
+        """Whether volumes are kept as well as is asked of a boundary that glides on a mesh."""
+        volumes = _core.mesh.tet_volumes(x, self.T)
+        rings = _core.measures.ring_sums(self.T, volumes / volumes.sum(), len(self.V))
+        spread = float((rings / self.rings).std())
+        moved = 0.25 * float(np.abs(rings - self.rings).sum())
+        return spread <= self.options.glide_std and moved <= self.options.glide_distortion
+
     @cached_property
     def glide_surface(self) -> _core.volume.GlideSurface:
         """What the boundary may glide on."""

@@ -49,6 +49,10 @@ class FillOptions:
     frozen_weight, face_weight, glide_iter, glide_tol
         Where the boundary glides: lambda at which that starts, weight of the boundary triangles'
         barrier, most steps and the share at which to stop.
+    glide_std, glide_distortion : float
+        SD of the ratios (6.5) round vertices, and total distortion (6.4), that are enough of a
+        boundary that glides on a mesh: when both are met it stops, for the farther vertices glide
+        the less they correspond. 0 goes on until the energy is at rest.
     shared : int
         Most steps in a row that share one Hessian; 1 renews it at every step.
     cg_tol : float
@@ -85,6 +89,8 @@ class FillOptions:
     face_weight: float = 1.0
     glide_iter: int = 500
     glide_tol: float = 2e-3
+    glide_std: float = 0.028
+    glide_distortion: float = 0.014
     shared: int = 5
     cg_tol: float = 0.1
     max_cg: int = 200
@@ -97,7 +103,7 @@ class FillOptions:
             real(name, getattr(self, name), above=0.0)
         for name in ("growth", "max_aspect"):
             real(name, getattr(self, name), 1.0)
-        for name in ("floor", "frozen_tol", "glide_tol"):
+        for name in ("floor", "frozen_tol", "glide_tol", "glide_std", "glide_distortion"):
             real(name, getattr(self, name), 0.0, below=1.0)
         for name in ("untangle_iter", "frozen_iter", "glide_iter"):
             whole(name, getattr(self, name), 0)

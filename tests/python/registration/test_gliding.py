@@ -39,9 +39,36 @@ def test_gliding_keeps_volumes_below_the_boundary(pair, maps):
     held, glided = maps["frozen"], maps["glide"]
     assert glided.certificate.certified and glided.boundary == "glide"
     assert held.boundary == "frozen"
-    assert glided.distortion.ring_std < 0.65 * held.distortion.ring_std
-    assert glided.distortion.total_distortion < 0.65 * held.distortion.total_distortion
+    assert glided.distortion.ring_std < 0.62 * held.distortion.ring_std
+    assert glided.distortion.total_distortion < 0.58 * held.distortion.total_distortion
     assert "glide" in {record.stage for record in glided.history}
+
+
+def test_gliding_against_the_truth(pair, maps):
+    """The true map does not keep volumes; one that does cannot come closer than it allows."""
+    true = sm.distortion(pair.source, pair.truth)
+    skin, size = pair.source.boundary_vertices, np.linalg.norm(np.ptp(pair.target.V, axis=0))
+    error = {
+        way: np.linalg.norm(done.image[: pair.source.n_vertices] - pair.truth, axis=1) / size
+        for way, done in maps.items()
+    }
+    assert maps["glide"].distortion.total_distortion < 0.3 * true.total_distortion
+    assert error["glide"].mean() < 0.017 and error["glide"][skin].mean() < 0.016
+    assert error["glide"].max() < 0.08
+    assert error["frozen"].mean() < 0.0095 and error["frozen"][skin].mean() < 0.009
+
+
+def test_gliding_goes_no_farther_than_is_asked():
+    pair = samples.vertebra_pair(n_landmarks=4, n_tets=(2500, 3500))
+    to_rest = FillOptions(glide_std=0.0, glide_distortion=0.0)
+    enough, most = (sm.register(pair.source, pair.target, options=o) for o in (None, to_rest))
+    assert enough.converged and enough.stop_reason == "volumes are kept"
+    assert enough.distortion.ring_std <= 0.028 and enough.distortion.total_distortion <= 0.014
+    assert most.distortion.total_distortion < enough.distortion.total_distortion
+    assert most.stop_reason != "volumes are kept"
+    frozen = sm.register(pair.source, pair.target, boundary="frozen")
+    drift = [np.linalg.norm(r.image - frozen.image, axis=1).mean() for r in (enough, most)]
+    assert drift[0] < drift[1]
 
 
 def test_landmarks_are_held_and_the_boundary_stays_on_the_target(pair, maps):
@@ -114,7 +141,7 @@ def test_the_distance_from_the_target_is_that_of_its_parts(pair, maps):
     image = sm.TriMesh(skin, result.mesh.surface.F)
     size = np.linalg.norm(np.ptp(image.V, axis=0)) / np.linalg.norm(np.ptp(pair.target.V, axis=0))
     assert result.surface_distance >= size * from_surface(pair.target.surface.V, image) - 1e-12
-    assert result.surface_distance < 0.1
+    assert result.surface_distance < 0.036
     assert result.to_dict()["surface_distance"] == result.surface_distance
 
 
@@ -123,7 +150,8 @@ def test_there_and_back_is_measured(pair, maps):
     back = sm.register(pair.target, pair.source, marks)
     gaps = sm.inverse_consistency(maps["glide"], back)
     assert gaps.shape == (maps["glide"].mesh.n_vertices,)
-    assert np.isnan(gaps).mean() < 0.01 and np.nanmedian(gaps) < 0.03
+    assert np.isnan(gaps).mean() < 0.01 and np.nanmedian(gaps) < 0.008
+    assert np.nanpercentile(gaps, 95) < 0.024
     assert np.nanmax(gaps[pair.source_landmarks]) < 1e-9
     with pytest.raises(KindError):
         sm.inverse_consistency(maps["glide"], maps["glide"])
