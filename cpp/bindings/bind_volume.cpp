@@ -87,15 +87,17 @@ void bind_newton(py::module_& m) {
            py::kw_only(), py::arg("surface"), py::arg("faces"), py::arg("rest"), py::arg("weights"))
       .def("facing", &least_facing, py::arg("x").noconvert(), release_gil());
   py::class_<NewtonOptions>(m, "NewtonOptions")
-      .def(py::init([](double tol, int max_cg, bool keep_hessian) {
+      .def(py::init([](double tol, int max_cg, bool keep_hessian, double negative) {
              NewtonOptions options;
              options.tol = tol;
              options.max_cg = max_cg;
              options.keep_hessian = keep_hessian;
+             options.negative = negative;
              return options;
            }),
            py::kw_only(), py::arg("tol") = NewtonOptions().tol,
-           py::arg("max_cg") = NewtonOptions().max_cg, py::arg("keep_hessian") = false);
+           py::arg("max_cg") = NewtonOptions().max_cg, py::arg("keep_hessian") = false,
+           py::arg("negative") = 0.0);
   py::class_<SolidNewton>(m, "SolidNewton")
       .def(py::init([](const PointsRef& x, const TetsRef& tets, const RowsRef& rest,
                        const VecRef& weights, const FlagsRef& motion,

@@ -117,16 +117,16 @@ STRETCHMAP_INLINE void gradients(ElementBatch& batch, const Jacobians& j, const 
 }
 
 // The Hessian in the basis of the singular vectors. Along the diagonal of U^T dJ V it is the 3x3
-// matrix A, of which the positive part is kept; off the diagonal the pair (i, j) has the eigenvalue
+// matrix A; off the diagonal the pair (i, j) has the eigenvalue
 // twist on the antisymmetric and flip on the symmetric part.
 struct Modes {
-  alignas(64) Lane A[9];     // positive part
+  alignas(64) Lane A[9];
   alignas(64) Lane half[3];  // (twist + flip) / 2 of the pair without k
   alignas(64) Lane odd[3];   // (flip - twist) / 2
 };
 
 STRETCHMAP_INLINE void modes(const Lane (&sigma)[3], const Lane& squared, const Terms& t,
-                             const Lane& slope, Modes& out) {
+                             const Lane& slope, double negative, Modes& out) {
   alignas(64) Lane d[3], curvature;
   for (int k = 0; k < 3; ++k)
     for (int l = 0; l < kLanes; ++l)
@@ -141,11 +141,12 @@ STRETCHMAP_INLINE void modes(const Lane (&sigma)[3], const Lane& squared, const 
         A[3 * i + j][l] =
             mixed + (i == j ? 2.0 * t.a[l] : slope[l] * sigma[i == j ? 0 : 3 - i - j][l]);
       }
-  lane_positive_part(A, out.A);
+  lane_damp_negative(A, negative, out.A);
   for (int k = 0; k < 3; ++k)
     for (int l = 0; l < kLanes; ++l) {
-      const double twist = std::max(0.0, 2.0 * t.a[l] + slope[l] * sigma[k][l]);
-      const double flip = std::max(0.0, 2.0 * t.a[l] - slope[l] * sigma[k][l]);
+      const double mean = 2.0 * t.a[l], part = slope[l] * sigma[k][l];
+      const double twist = std::max(mean + part, negative * (mean + part));
+      const double flip = std::max(mean - part, negative * (mean - part));
       out.half[k][l] = 0.5 * (twist + flip);
       out.odd[k][l] = 0.5 * (flip - twist);
     }
@@ -217,7 +218,7 @@ void element_models(ElementBatch& batch, const EnergyWeights& w) {
   LaneSvd svd;
   lane_svd(j.J, svd);
   Modes m;
-  modes(svd.sigma, j.squared, t, slope, m);
+  modes(svd.sigma, j.squared, t, slope, w.negative, m);
   alignas(64) Lane g[3][3];  // V^T times the rows of the rest matrix
   for (int a = 0; a < 3; ++a)
     for (int i = 0; i < 3; ++i)

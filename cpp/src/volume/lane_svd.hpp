@@ -162,8 +162,9 @@ STRETCHMAP_INLINE void lane_annihilate(Lane* A, Lane* Q, int p, int q, LaneSweep
   }
 }
 
-// The symmetric A with its negative eigenvalues set to zero (two-sided Jacobi).
-STRETCHMAP_INLINE void lane_positive_part(Lane* A, Lane* out) {
+// The symmetric A with its negative eigenvalues multiplied by a factor in [0, 1) (two-sided
+// Jacobi).
+STRETCHMAP_INLINE void lane_damp_negative(Lane* A, double factor, Lane* out) {
   alignas(64) Lane Q[9];
   for (int k = 0; k < 9; ++k)
     for (int l = 0; l < kLanes; ++l) Q[k][l] = k % 4 == 0 ? 1.0 : 0.0;
@@ -178,7 +179,7 @@ STRETCHMAP_INLINE void lane_positive_part(Lane* A, Lane* out) {
       for (int l = 0; l < kLanes; ++l) {
         double sum = 0.0;
         for (int k = 0; k < 3; ++k)
-          sum += std::max(A[4 * k][l], 0.0) * Q[3 * k + i][l] * Q[3 * k + j][l];
+          sum += std::max(A[4 * k][l], factor * A[4 * k][l]) * Q[3 * k + i][l] * Q[3 * k + j][l];
         out[3 * i + j][l] = out[3 * j + i][l] = sum;
       }
 }

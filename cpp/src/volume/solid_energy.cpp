@@ -156,7 +156,7 @@ void SolidEnergy::model(const PointsRef& x, const EnergyWeights& w, Points& grad
   const Index n_rows = rows();
   const GlideSites at = sites(x, true);
 #pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row) into_frames(x, at, row, gradient, blocks);
+  for (Index row = 0; row < n_rows; ++row) into_frames(x, at, w.negative, row, gradient, blocks);
   if (w.face <= 0.0) return;
 #pragma omp parallel for schedule(static, 1)
   for (Index p = 0; p < parts; ++p) {
@@ -194,9 +194,9 @@ Matrix3d SolidEnergy::frame(const GlideSites& sites, Index vertex) const {
 }
 
 // Rewrites one block row in vertex frames and, for a gliding vertex, adds the surface's own second
-// derivatives (clamped to stay positive semi-definite) and removes the normal unknown.
-void SolidEnergy::into_frames(const PointsRef& x, const GlideSites& sites, Index row,
-                              Points& gradient, double* blocks) const {
+// derivatives (of negative eigenvalues a share) and removes the normal unknown.
+void SolidEnergy::into_frames(const PointsRef& x, const GlideSites& sites, double negative,
+                              Index row, Points& gradient, double* blocks) const {
   const Index vertex = row_vertex_[row];
   const Matrix3d Q = frame(sites, vertex);
   const bool gliding = motion_[vertex] == kGliding;
@@ -213,9 +213,9 @@ void SolidEnergy::into_frames(const PointsRef& x, const GlideSites& sites, Index
           barrier_.surface().bending(x.row(vertex).transpose(), sites(vertex).place, g);
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
       eigen.computeDirect(C);
-      turned.topLeftCorner<2, 2>() += eigen.eigenvectors() *
-                                      eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                                      eigen.eigenvectors().transpose();
+      const Eigen::Vector2d values = eigen.eigenvalues().cwiseMax(negative * eigen.eigenvalues());
+      turned.topLeftCorner<2, 2>() +=
+          eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
       turned(2, 2) = 1.0;
     }
     block = turned;

@@ -185,9 +185,25 @@ bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights
   return true;
 }
 
-NewtonReport SolidNewton::step(Points& x, const EnergyWeights& w, const NewtonOptions& options,
-                               const Poll& poll) {
+// After a direction of negative curvature. The projected Hessian has none; where it was in use, it
+// is the preconditioner that has one, and is renewed.
+bool SolidNewton::solve_projected(const PointsRef& x, EnergyWeights w, const NewtonOptions& options,
+                                  const Poll& poll, Points& direction, NewtonReport& report) {
+  changes_.clear();
+  const bool projected = w.negative == 0.0;
+  w.negative = 0.0;
+  if (projected)
+    solver_->refactor();
+  else if (!linearize(x, w))
+    return false;
+  return descend(options, poll, direction, report);
+}
+
+NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
+                               const NewtonOptions& options, const Poll& poll) {
   NewtonReport report;
+  EnergyWeights w = weights;
+  w.negative = options.negative;
   report.before = report.after = energy_.value(x, w);
   if (!std::isfinite(report.before.energy))
     throw Error("SolverError", "the energy is infinite: " + std::to_string(report.before.flips) +
@@ -206,12 +222,8 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& w, const NewtonOp
     }
     report.shift = shift;
     bool down = descend(options, poll, direction, report);
-    // Projected Hessians have no negative curvature: the preconditioner does, and is renewed.
-    if (report.negative_curvature && shift == 0.0) {
-      changes_.clear();
-      solver_->refactor();
-      down = descend(options, poll, direction, report);
-    }
+    if (report.negative_curvature && shift == 0.0)
+      down = solve_projected(x, w, options, poll, direction, report);
     if (!down) continue;
     if (search(x, direction, w, report)) break;
     if (report.decrement <= kRounding * std::abs(report.before.energy)) break;

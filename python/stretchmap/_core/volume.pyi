@@ -89,7 +89,7 @@ class GlidingBoundary:
     def facing(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         ...
 class NewtonOptions:
-    def __init__(self, *, tol: typing.SupportsFloat | typing.SupportsIndex = 0.01, max_cg: typing.SupportsInt | typing.SupportsIndex = 300, keep_hessian: bool = False) -> None:
+    def __init__(self, *, tol: typing.SupportsFloat | typing.SupportsIndex = 0.01, max_cg: typing.SupportsInt | typing.SupportsIndex = 300, keep_hessian: bool = False, negative: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
 class SolidNewton:
     def __init__(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], *, tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], rest: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], motion: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"], boundary: GlidingBoundary | None = None) -> None:

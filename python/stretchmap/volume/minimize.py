@@ -19,7 +19,9 @@ __all__ = ["Minimized", "minimize"]
 
 _SERVED = 0.5  # a shorter step shows that a Hessian is too old
 _DRIFT = 1e-4  # of the volume enclosed, before targets are set anew
-_REST = 6  # steps with a Hessian each after one was too old
+_REST = 1  # steps with a Hessian each after one was too old
+# Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
+_NEGATIVE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,10 @@ def minimize(
                 newton.set_targets(model.inflating(volume))
                 enclosed = volume
         linear = _core.volume.NewtonOptions(
-            tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=sharing.kept > 0
+            tol=o.cg_tol,
+            max_cg=o.max_cg,
+            keep_hessian=sharing.kept > 0,
+            negative=_NEGATIVE if weight >= o.volume_weight else 0.0,
         )
         x, step = newton.step(x, weights, linear)
         before, after = step.before.energy / weight, step.after.energy / weight

@@ -20,8 +20,9 @@ namespace stretchmap::volume {
 struct EnergyWeights {
   double shape = 1.0;
   double volume = 1.0;
-  double epsilon = 0.0;  // 0: barrier; the energy is infinite on inverted tets and folded faces
-  double face = 0.0;     // of the boundary triangles, where the boundary glides
+  double epsilon = 0.0;   // 0: barrier; the energy is infinite on inverted tets and folded faces
+  double face = 0.0;      // of the boundary triangles, where the boundary glides
+  double negative = 0.0;  // share of its negative eigenvalues that a model's Hessian keeps, below 1
 };
 
 struct Regularized {
@@ -64,8 +65,8 @@ void element_values(ElementBatch& batch, const EnergyWeights& w);
 void element_gradients(ElementBatch& batch, const EnergyWeights& w);
 
 // \param batch all is filled. The blocks are those of the Hessian of psi by vec(J) with its
-//        negative eigenvalues set to zero, which come in closed form from the singular values
-//        (Smith, de Goes, Kim, ACM TOG 38(1), 2019).
+//        negative eigenvalues multiplied by w.negative; they come in closed form from the singular
+//        values (Smith, de Goes, Kim, ACM TOG 38(1), 2019).
 void element_models(ElementBatch& batch, const EnergyWeights& w);
 
 using Block3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;

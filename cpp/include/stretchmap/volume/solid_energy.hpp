@@ -57,7 +57,7 @@ class SolidEnergy {
   EnergyReport value(const PointsRef& x, const EnergyWeights& w) const;
 
   // \param gradient (rows, 3) in vertex frames.
-  // \param hessian likewise, positive semi-definite; not computed if null.
+  // \param hessian likewise, positive semi-definite if w.negative is 0; not computed if null.
   // \pre value(x, w).energy is finite.
   void model(const PointsRef& x, const EnergyWeights& w, Points& gradient,
              linalg::BlockMatrix* hessian) const;
@@ -107,8 +107,8 @@ class SolidEnergy {
                    Points& gradient, double* blocks) const;
   void add_face(const PointsRef& x, const GlideSites& sites, const EnergyWeights& w, Index f,
                 Index first, Index last, Points& gradient, double* blocks) const;
-  void into_frames(const PointsRef& x, const GlideSites& sites, Index row, Points& gradient,
-                   double* blocks) const;
+  void into_frames(const PointsRef& x, const GlideSites& sites, double negative, Index row,
+                   Points& gradient, double* blocks) const;
 
   Tets tets_;       // sorted by lowest row
   IndexVec order_;  // which of the tets given each of them is

@@ -15,6 +15,11 @@ struct NewtonOptions {
   // the gradient since (limited-memory BFGS): several times cheaper, nearly as good while the
   // weights stay the same.
   bool keep_hessian = false;
+  // Share of the elements' negative eigenvalues that a new Hessian keeps, see EnergyWeights. Near a
+  // minimum pressures are balanced: much of what one element counts as negative its neighbors count
+  // as positive. All dropped, the sum is far too stiff; all kept, it is often indefinite. Where it
+  // turns out to be, the step is made with 0.
+  double negative = 0.0;
 };
 
 struct NewtonReport {
@@ -65,6 +70,8 @@ class SolidNewton {
   };
 
   bool renew(const PointsRef& x, const EnergyWeights& w, bool keep);
+  bool solve_projected(const PointsRef& x, EnergyWeights w, const NewtonOptions& options,
+                       const Poll& poll, Points& direction, NewtonReport& report);
   bool linearize(const PointsRef& x, const EnergyWeights& w);
   bool descend(const NewtonOptions& options, const Poll& poll, Points& direction,
                NewtonReport& report);
