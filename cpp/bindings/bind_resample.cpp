@@ -56,10 +56,12 @@ void bind(py::module_& m) {
           release_gil())
       .def(
           "set_fit",
-          [](HexNewton& self, const FitSamples& samples, const VecRef& factor) {
-            self.energy().set_fit(samples, factor);
+          [](HexNewton& self, const FitSamples& samples, const VecRef& factor, double tolerance,
+             double power) {
+            self.energy().set_fit(samples, factor, {tolerance, power});
           },
-          py::arg("samples"), py::arg("factor").noconvert(), release_gil())
+          py::arg("samples"), py::arg("factor").noconvert(), py::arg("tolerance") = 1.0,
+          py::arg("power") = 1.0, release_gil())
       .def(
           "value",
           [](const HexNewton& self, const PointsRef& x, const volume::EnergyWeights& corner,
@@ -82,15 +84,16 @@ void bind(py::module_& m) {
       .def(
           "run",
           [](HexNewton& self, Points x, const volume::EnergyWeights& corner, double power,
-             int max_steps, double least_gain) {
+             int max_steps, double least_gain, double tol) {
             HexNewtonOptions options;
             options.max_steps = max_steps;
             options.least_gain = least_gain;
+            options.tol = tol;
             const HexNewtonReport report = self.run(x, {corner, power}, options, signal_poll());
             return std::make_pair(std::move(x), report);
           },
           py::arg("x"), py::arg("corner"), py::arg("power"), py::arg("max_steps"),
-          py::arg("least_gain") = 1e-3, release_gil());
+          py::arg("least_gain") = 1e-3, py::arg("tol") = 0.1, release_gil());
 }
 
 }  // namespace stretchmap::resample

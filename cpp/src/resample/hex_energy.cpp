@@ -19,6 +19,17 @@ using volume::ElementBatch;
 
 }  // namespace
 
+double FitNorm::value(double d) const {
+  return tolerance * tolerance * (std::pow(base(d), power) - 1.0) / power;
+}
+
+double FitNorm::slope(double d) const { return 2.0 * d * std::pow(base(d), power - 1.0); }
+
+double FitNorm::curvature(double d) const {
+  const double b = base(d);
+  return 2.0 * std::pow(b, power - 1.0) * (1.0 + 2.0 * (power - 1.0) * (b - 1.0) / b);
+}
+
 HexEnergy::HexEnergy(const HexesRef& hexes, Index n) : n_(n), hexes_(hexes) {
   const Index k = static_cast<Index>(hexes_.rows());
   const Incidence<> corners = corners_at(hexes_, n);
@@ -50,9 +61,10 @@ void HexEnergy::set_rest(const Eigen::Ref<const Rows24>& sides, const VecRef& we
   guarded_ = std::move(guarded);
 }
 
-void HexEnergy::set_fit(FitSamples samples, const VecRef& factor) {
+void HexEnergy::set_fit(FitSamples samples, const VecRef& factor, const FitNorm& norm) {
   fit_ = std::move(samples);
   factor_ = factor;
+  norm_ = norm;
 }
 
 linalg::BlockMatrix HexEnergy::pattern() const {
@@ -118,8 +130,7 @@ HexReport HexEnergy::value(const PointsRef& x, const HexWeights& w) const {
   const double fit = sum_chunks<1>(static_cast<Index>(factor_.size()),
                                    [&](Index begin, Index end, std::array<double, 1>& sums) {
                                      for (Index j = begin; j < end; ++j) {
-                                       const double d = gap(x, j);
-                                       sums[0] += factor_[j] * d * d;
+                                       sums[0] += factor_[j] * norm_.value(gap(x, j));
                                      }
                                    })[0];
   return {energy + fit, fit, k > 0 ? least.minCoeff() : 0.0, flips.sum()};
@@ -176,8 +187,9 @@ void HexEnergy::model(const PointsRef& x, const HexWeights& w, Points& gradient,
 void HexEnergy::add_fit(const PointsRef& x, Points& gradient, double* blocks) const {
   for (Index j = 0; j < factor_.size(); ++j) {
     const RowVector3d normal = fit_.normal.row(j);
-    const double slope = 2.0 * factor_[j] * gap(x, j);
-    const RowMatrix3d plane = 2.0 * factor_[j] * normal.transpose() * normal;
+    const double d = gap(x, j);
+    const double slope = factor_[j] * norm_.slope(d);
+    const RowMatrix3d plane = factor_[j] * norm_.curvature(d) * normal.transpose() * normal;
     for (int a = 0; a < 4; ++a) {
       const double weight = fit_.weights(j, a);
       if (weight == 0.0) continue;

@@ -24,21 +24,24 @@ from .hex_result import HexMesh
 from .layout import Layout, prolongation, swept_layout
 from .optimize import GridOptimizer, Schedule
 from .quality import boundary_distances, boundary_quads
-from .sizes import grid_numbers
+from .sizes import grid_candidates
+from .start import best_start, pulled_back
 
 if TYPE_CHECKING:
-    from ..maps.points import PointMap
     from ..maps.result import MapResult
     from ..mesh.meshes import TetMesh
 
 __all__ = ["HexMesh", "hex_mesh"]
 
-_BISECTIONS = 40
 _MOST = 100_000  # hexahedra in any direction
 _BYTES_PER_HEX = 6000  # at the peak
 _COARSE = 16_000  # hexahedra that are optimized at once
 # Of a grid that was split in eight: smaller quads fit better.
-_FINER = Schedule(fit=3.0, powers=(2.0,) * 2 + (3.0,) * 2 + (4.0,) * 2 + (6.0,) * 3 + (8.0,) * 3)
+_FINER = Schedule(
+    fit=3.0,
+    powers=(*(2.0,) * 2, *(3.0,) * 2, *(4.0,) * 2, *(6.0,) * 3, *(8.0,) * 3, *(12.0,) * 3),
+)
+_FINEST = Schedule(fit=3.0, powers=(2.0, 4.0, 8.0, 12.0))
 
 
 def hex_mesh(
@@ -97,8 +100,9 @@ def hex_mesh(
 
     Notes
     -----
-    A grid of more than 16,000 hexahedra with even numbers is optimized with half the numbers
-    first, then split in eight and finished.
+    Up to three choices of the numbers are begun with; the one whose boundary comes closest to the
+    surface in the first rounds is gone on with. A grid of more than 16,000 hexahedra with even
+    numbers is optimized with half the numbers first, then split in eight and finished.
 
     References
     ----------
@@ -117,28 +121,31 @@ def hex_mesh(
     callback("progress", progress)
     thicknesses = thicknesses_of(layers)
     torus = torus_of(result)
-    numbers = _numbers(solid.volume, torus.ratio, n_hexahedra, target_size, sections, block, rings)
-    count = numbers[0] * numbers[1] * (numbers[1] + 4 * numbers[2])
+    candidates = _numbers(
+        solid.volume, torus.ratio, n_hexahedra, target_size, sections, block, rings
+    )
+    count = max(s * b * (b + 4 * r) for s, b, r in candidates)
     memory(f"a grid of {count} hexahedra", _BYTES_PER_HEX * count)
     levels = 0
     if flag("optimize", optimize):
-        while count > _COARSE * 8**levels and not any(k % 2 ** (levels + 1) for k in numbers):
+        while count > _COARSE * 8**levels and not np.any(np.array(candidates) % 2 ** (levels + 1)):
             levels += 1
-    coarse = tuple(k // 2**levels for k in numbers)
-    layout = swept_layout(*coarse)
-    grid, V = _pulled_back(result, layout)
-    n_invalid = int((_core.resample.valid_hexes(V, layout.H) == 0).sum())
-    pulled = V
+        start = best_start(result, solid, np.array(candidates) // 2**levels, progress)
+    else:
+        start = pulled_back(result, candidates[0])
+    layout, grid, pulled, V = start.layout, start.grid, start.pulled, start.V
+    n_invalid = int((_core.resample.valid_hexes(pulled, layout.H) == 0).sum())
     if optimize:
         V = _optimized(V, layout.H, solid, Schedule(), progress)
         for level in range(levels):
-            finer = prolongation(*(k * 2**level for k in coarse))
-            layout = swept_layout(*(k * 2 ** (level + 1) for k in coarse))
+            finer = prolongation(*(k * 2**level for k in start.numbers))
+            layout = swept_layout(*(k * 2 ** (level + 1) for k in start.numbers))
             V, pulled = (np.ascontiguousarray(finer @ points) for points in (V, pulled))
-            V = _optimized(V, layout.H, solid, _FINER, progress)
+            V = _optimized(V, layout.H, solid, _FINER if level == 0 else _FINEST, progress)
         if levels:
             grid = torus.xi(layout.u, layout.v, layout.share * torus.r)
     if len(thicknesses):
+        numbers = tuple(k * 2**levels for k in start.numbers)
         layout, V, (grid, pulled) = with_layers(numbers, V, (grid, pulled), thicknesses)
         if optimize:
             _require_valid(V, layout.H, "the layers are too thick for the bends of the boundary")
@@ -153,8 +160,8 @@ def _numbers(
     sections: int | None,
     block: int | None,
     rings: int | None,
-) -> tuple[int, int, int]:
-    """The three numbers, those that are given and those to be chosen."""
+) -> list[tuple[int, int, int]]:
+    """Candidates for the three numbers; one if some of them are given."""
     if sum((n_hexahedra is not None, target_size is not None)) > 1:
         raise OptionError("give n_hexahedra or target_size, not both")
     if target_size is not None:
@@ -165,12 +172,20 @@ def _numbers(
     wanted, levels = max(wanted, 12.0), 0
     while wanted > _COARSE * 8**levels:
         levels += 1
-    chosen = tuple(2**levels * k for k in grid_numbers(ratio, wanted / 8**levels))
-    return (
-        whole("sections", chosen[0] if sections is None else sections, 3, _MOST),
-        whole("block", chosen[1] if block is None else block, 1, _MOST),
-        whole("rings", chosen[2] if rings is None else rings, 1, _MOST),
-    )
+    chosen = [
+        (2**levels * s, 2**levels * b, 2**levels * r)
+        for s, b, r in grid_candidates(ratio, wanted / 8**levels)
+    ]
+    if sections is block is rings is None:
+        return chosen
+    first = chosen[0]
+    return [
+        (
+            whole("sections", first[0] if sections is None else sections, 3, _MOST),
+            whole("block", first[1] if block is None else block, 1, _MOST),
+            whole("rings", first[2] if rings is None else rings, 1, _MOST),
+        )
+    ]
 
 
 def _optimized(
@@ -193,23 +208,6 @@ def _require_valid(V: NDArray[np.float64], H: NDArray[np.int32], remedy: str) ->
     left = np.flatnonzero(_core.resample.valid_hexes(V, H) == 0)
     if len(left):
         raise SolverError(f"{len(left)} hexahedra could not be made valid; {remedy}", left)
-
-
-def _pulled_back(
-    result: MapResult, layout: Layout
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The grid in the image, and its points in the source.
-
-    The outermost points lie where the ray from the core through them leaves the image, so that they
-    come to lie on the boundary of the source.
-    """
-    torus, points = torus_of(result), result.point_map
-    grid = torus.xi(layout.u, layout.v, layout.share * _reach(points, torus, layout.u, layout.v))
-    located = points.inverse(grid)
-    lost = np.flatnonzero(~located.inside)
-    if len(lost):
-        raise SolverError(f"{len(lost)} points of the grid lie outside the image", lost)
-    return grid, located.points
 
 
 def _measured(
@@ -245,17 +243,3 @@ def _measured(
         moved=float(moves.max()),
         boundary_moved=float(moves[layout.boundary].max()),
     )
-
-
-def _reach(
-    points: PointMap, torus: Torus, u: NDArray[np.float64], v: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Largest s, up to r, for which xi(u, v, s) lies in the image; by bisection."""
-    low, high = np.zeros(len(u)), np.full(len(u), torus.r)
-    if not points.inverse(torus.xi(u, v, low)).inside.all():
-        raise SolverError("the core of the torus lies outside the image; is the map certified?")
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        inside = points.inverse(torus.xi(u, v, middle)).inside
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    return low

@@ -27,6 +27,7 @@ __all__ = ["GridOptimizer", "Schedule"]
 _VOLUME_WEIGHT = 0.1
 _LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
 _STEPS = 3  # Newton steps between two looks at boxes and samples
+_RESIDUAL = 0.01  # of their linear systems
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
 _PULL = 0.3  # share of the way to the mean size, in logarithms, that boxes grow or shrink ...
@@ -36,8 +37,8 @@ _PER_SIDE = 3  # samples of a quad, squared, its corners among them
 _FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
-_TOLERANCE = 0.005  # of the diagonal: larger gaps count more and more ...
-_MOST_BOOST = 100.0  # ... up to this
+_TOLERANCE = 0.005  # of the diagonal: larger gaps count more ...
+_NORM = 2.0  # ... with the power 2 _NORM
 _LOOSER = 0.6  # factor of the fit where it is in the way
 _HARDER = 2.0  # factor of the weight of a hexahedron each time it is found invalid
 _REPAIRS = 10
@@ -102,8 +103,8 @@ class GridOptimizer:
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
 
-    def run(self, schedule: Schedule, progress: Progress | None = None) -> None:
-        """All stages; stops early where hexahedra cannot be made positive.
+    def run(self, schedule: Schedule, progress: Progress | None = None) -> bool:
+        """All stages; stops early, and returns False, where corners cannot be made positive.
 
         Raises
         ------
@@ -111,7 +112,7 @@ class GridOptimizer:
             A linear solve broke down.
         """
         if not self._untangle(schedule.untangle, progress):
-            return
+            return False
         valid = None
         for done, power in enumerate(schedule.powers):
             report(progress, "optimize", done, len(schedule.powers), power=power)
@@ -122,12 +123,13 @@ class GridOptimizer:
             invalid = self._invalid()
             report(progress, "validity", done, _INVALID_ROUNDS, invalid=int(invalid.sum()))
             if not invalid.any():
-                return
+                return True
             # Harder on these, and the boundary gives way.
             self._weights[invalid] *= _HARDER
-            self._descend(schedule.powers[-1], _LOOSER ** (done + 1), 0.0)
+            self._descend(schedule.powers[-1], _LOOSER ** (done + 1), 1.0)
         if valid is not None and self._invalid().any():
             self.V = valid
+        return True
 
     def _invalid(self) -> NDArray[np.bool_]:
         return np.asarray(_core.resample.valid_hexes(self.V, self.H) == 0)
@@ -136,7 +138,7 @@ class GridOptimizer:
         """Whether all edge triples are positive."""
         strength, least = _LOOSE, len(self.H) * 32
         for done in range(rounds + 1):
-            self._prepare(strength, 0.0)
+            self._prepare(strength, 1.0)
             start = self._newton.value(self.V, _corner(1.0))
             report(progress, "untangle", done, rounds, bad=start.flips)
             if start.flips == 0:
@@ -151,17 +153,17 @@ class GridOptimizer:
 
     def _round(self, power: float, fit: float) -> None:
         # What the shape gains in weight, the fit gains, too.
-        self._descend(power, fit * np.sqrt(power), _MOST_BOOST)
+        self._descend(power, fit * np.sqrt(power), _NORM)
 
-    def _descend(self, power: float, strength: float, boost: float) -> None:
+    def _descend(self, power: float, strength: float, norm: float) -> None:
         """Newton steps under the barrier, which guarded triples have to be inside of first."""
-        self._prepare(strength, boost)
+        self._prepare(strength, norm)
         if self._min_det() <= 0.0:
             if not self._repaired():
                 self._guarded &= _core.resample.least_edge_jacobians(self.V, self.H) > 0.0
-            self._prepare(strength, boost, guard=False)
+            self._prepare(strength, norm, guard=False)
         if self._min_det() > 0.0:
-            self.V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS)
+            self.V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS, tol=_RESIDUAL)
 
     def _repaired(self) -> bool:
         """Whether all guarded triples are positive after regularized steps; undone if not.
@@ -170,7 +172,7 @@ class GridOptimizer:
         """
         before = self.V
         for done in range(_REPAIRS):
-            self._prepare(_LOOSE * _LOOSER**done, 0.0)
+            self._prepare(_LOOSE * _LOOSER**done, 1.0)
             min_det = self._min_det()
             if min_det > 0.0:
                 return True
@@ -185,14 +187,14 @@ class GridOptimizer:
         epsilon = float(np.clip(-0.5 * min_det, _LEAST_EPSILON, _LARGEST_EPSILON))
         self.V, _ = self._newton.run(self.V, _corner(epsilon), 1.0, _STEPS)
 
-    def _prepare(self, strength: float, boost: float, guard: bool = True) -> None:
+    def _prepare(self, strength: float, norm: float, guard: bool = True) -> None:
         """Boxes and samples of the boundary for the present points."""
         if guard:
             self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
         self._newton.set_rest(self._sides(_MEAN), self._weights, self._guarded)
         samples = self._fit.match(self.V)
-        factor = 1.0 + np.minimum((samples.distance / self._tolerance) ** 2, boost)
-        self._newton.set_fit(samples, strength * self._strength * samples.share * factor)
+        factor = strength * self._strength * samples.share
+        self._newton.set_fit(samples, factor, self._tolerance, norm)
 
     def _sides(self, mean: float) -> NDArray[np.float64]:
         """(k, 24) sides of the corners' boxes: their own edges, drawn to local means, and hexahedra

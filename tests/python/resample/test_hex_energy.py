@@ -42,7 +42,7 @@ def test_gradient_and_hessian_are_those_of_the_value(epsilon, power, guarded):
     sides, weights = rng.uniform(0.5, 1.5, (len(H), 24)), rng.uniform(0.5, 1.5, len(H))
     newton.set_rest(sides, weights, np.full(len(H), guarded))
     samples_ = a_fit(H).match(V)
-    newton.set_fit(samples_, rng.uniform(1.0, 2.0, len(samples_.share)))
+    newton.set_fit(samples_, rng.uniform(1.0, 2.0, len(samples_.share)), 0.05, power)
     corner = _core.volume.EnergyWeights(1.0, 0.2, epsilon)
     gradient, start, col, values = newton.model(V, corner, power)
     way = rng.standard_normal(V.shape)

@@ -1,6 +1,6 @@
-// How far the boundary of a hexahedral grid is from a surface, as a sum of squares.
+// How far the boundary of a hexahedral grid is from a surface, as a sum over samples.
 //
-//   E(x) = sum_j c_j (n_j . (sum_i w_ji x_i - y_j))^2
+//   E(x) = sum_j c_j g(n_j . (sum_i w_ji x_i - y_j))
 //
 // over samples j of both: points of each boundary quad against the closest points of the surface,
 // and points of the surface against the closest ones of the grid. n_j is the normal of the surface,

@@ -1,6 +1,6 @@
 // Distortion of a hexahedral grid, and how far its boundary is from a surface.
 //
-//   Psi(x) = sum_h weight_h / 8 sum_t f(psi(J_ht)) + sum_j c_j (n_j . (sum_i w_ji x_i - y_j))^2,
+//   Psi(x) = sum_h weight_h / 8 sum_t f(psi(J_ht)) + sum_j c_j g(n_j . (sum_i w_ji x_i - y_j)),
 //   f(psi) = ((1 + psi)^p - 1) / p,     J_ht = [e_1, e_2, e_3] diag(1 / sides),
 //
 // over triples t of edges e_1, e_2, e_3 of each hexahedron, those at its eight corners and, where
@@ -28,6 +28,18 @@ struct HexWeights {
   double power = 1.0;
 };
 
+// What a gap d costs: g(d) = t^2 ((1 + d^2 / t^2)^p - 1) / p, about d^2 below the tolerance t and
+// the power 2 p of d above, so that the largest gaps count most.
+struct FitNorm {
+  double tolerance = 1.0;
+  double power = 1.0;
+
+  double base(double d) const { return 1.0 + d * d / (tolerance * tolerance); }
+  double value(double d) const;
+  double slope(double d) const;
+  double curvature(double d) const;
+};
+
 struct HexReport {
   double energy = 0.0;  // +infinity if epsilon = 0 and a corner is not positive
   double fit = 0.0;     // the second sum alone
@@ -48,7 +60,7 @@ class HexEnergy {
   void set_rest(const Eigen::Ref<const Rows24>& sides, const VecRef& weights, Flags guarded);
   // \param samples their corners are those of a face of a hexahedron.
   // \param factor (s) the c_j.
-  void set_fit(FitSamples samples, const VecRef& factor);
+  void set_fit(FitSamples samples, const VecRef& factor, const FitNorm& norm = {});
 
   Index rows() const { return n_; }
   linalg::BlockMatrix pattern() const;
@@ -74,6 +86,7 @@ class HexEnergy {
   Vec weights_, factor_;
   Flags guarded_;
   FitSamples fit_;
+  FitNorm norm_;
   IndexVec row_ptr_, col_;
   IndexRows slot_;                              // (k, 64) block of each pair of corners, or -1
   std::vector<std::vector<Index>> part_hexes_;  // those that touch the rows of each part, ascending

@@ -1,0 +1,118 @@
+"""Where the optimization of a grid starts: pulled back by the map, the best of some numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.progress import Progress
+from ..base.torus import Torus
+from ..errors import SolverError
+from ..maps.given import torus_of
+from .layout import Layout, swept_layout
+from .optimize import GridOptimizer, Schedule
+from .quality import boundary_distances, boundary_quads
+
+if TYPE_CHECKING:
+    from ..maps.points import PointMap
+    from ..maps.result import MapResult
+    from ..mesh.meshes import TetMesh
+
+__all__ = ["Start", "best_start", "pulled_back"]
+
+_BISECTIONS = 40
+_TRIAL = Schedule(powers=(1.0,) * 4 + (2.0,) * 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A grid in the image and in the source.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        Sections, block, rings.
+    layout : Layout
+    grid : ndarray, shape (n, 3)
+        In the image.
+    pulled : ndarray, shape (n, 3)
+        Pulled back to the source.
+    V : ndarray, shape (n, 3)
+        The same after the first rounds of optimization, if there were any.
+    """
+
+    numbers: tuple[int, int, int]
+    layout: Layout
+    grid: NDArray[np.float64]
+    pulled: NDArray[np.float64]
+    V: NDArray[np.float64]
+
+
+def best_start(
+    result: MapResult,
+    solid: TetMesh,
+    candidates: Sequence[Sequence[int]] | NDArray[np.int_],
+    progress: Progress | None = None,
+) -> Start:
+    """The grid whose boundary is the closest to the surface after the first rounds.
+
+    One with hexahedra that are not positive comes after all others. A single candidate is only
+    pulled back.
+
+    Raises
+    ------
+    SolverError
+        No candidate could be pulled back and begun with.
+    """
+    if len(candidates) == 1:
+        return pulled_back(result, candidates[0])
+    best, least, failure = None, (2, np.inf), None
+    for numbers in candidates:
+        start = pulled_back(result, numbers)
+        optimizer = GridOptimizer(start.V, start.layout.H, solid.surface)
+        try:
+            positive = optimizer.run(_TRIAL, progress)
+        except SolverError as error:
+            failure = error
+            continue
+        away = max(boundary_distances(optimizer.V, boundary_quads(start.layout.H), solid.surface))
+        if (int(not positive), away) < least:
+            best, least = replace(start, V=optimizer.V), (int(not positive), away)
+    if best is None:
+        raise SolverError(f"no grid could be begun with: {failure}") from failure
+    return best
+
+
+def pulled_back(result: MapResult, numbers: Sequence[int] | NDArray[np.int_]) -> Start:
+    """The grid as the map leaves it.
+
+    The outermost points lie where the ray from the core through them leaves the image, so that they
+    come to lie on the boundary of the source.
+    """
+    sections, block, rings = (int(k) for k in numbers)
+    layout = swept_layout(sections, block, rings)
+    torus, points = torus_of(result), result.point_map
+    grid = torus.xi(layout.u, layout.v, layout.share * _reach(points, torus, layout.u, layout.v))
+    located = points.inverse(grid)
+    lost = np.flatnonzero(~located.inside)
+    if len(lost):
+        raise SolverError(f"{len(lost)} points of the grid lie outside the image", lost)
+    return Start((sections, block, rings), layout, grid, located.points, located.points)
+
+
+def _reach(
+    points: PointMap, torus: Torus, u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Largest s, up to r, for which xi(u, v, s) lies in the image; by bisection."""
+    low, high = np.zeros(len(u)), np.full(len(u), torus.r)
+    if not points.inverse(torus.xi(u, v, low)).inside.all():
+        raise SolverError("the core of the torus lies outside the image; is the map certified?")
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        inside = points.inverse(torus.xi(u, v, middle)).inside
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return low

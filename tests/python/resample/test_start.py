@@ -1,0 +1,59 @@
+"""Which grid the optimization goes on with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from shapes import a_map
+from stretchmap.errors import SolverError
+from stretchmap.resample import start as module
+from stretchmap.resample.quality import boundary_distances, boundary_quads
+from stretchmap.resample.sizes import grid_candidates
+from stretchmap.resample.start import best_start, pulled_back
+
+
+def a_ring():
+    solid = sm.samples.solid_torus(1500, R=3.0, r=1.0)
+    return a_map(solid, solid.V, sm.Torus(3.0, 1.0)), solid
+
+
+def test_of_several_the_one_closest_to_the_surface_is_gone_on_with():
+    result, solid = a_ring()
+
+    def away(start):
+        found = boundary_distances(start.V, boundary_quads(start.layout.H), solid.surface)
+        return max(found)
+
+    candidates = [(6, 1, 1), (16, 3, 1), (8, 2, 1)]
+    best = best_start(result, solid, candidates)
+    assert best.numbers == (16, 3, 1)
+    assert np.array_equal(best.pulled, pulled_back(result, best.numbers).V)
+    assert away(best) < min(
+        away(best_start(result, solid, [numbers] * 2)) for numbers in candidates[::2]
+    )
+
+
+def test_a_candidate_that_breaks_down_is_passed_over(monkeypatch):
+    result, solid = a_ring()
+    real = module.GridOptimizer.run
+
+    def run(self, schedule, progress=None):
+        if len(self.H) == 6 * 5:
+            raise SolverError("broke down")
+        return real(self, schedule, progress)
+
+    monkeypatch.setattr(module.GridOptimizer, "run", run)
+    assert best_start(result, solid, [(6, 1, 1), (8, 2, 1)]).numbers == (8, 2, 1)
+    with pytest.raises(SolverError, match="no grid could be begun with: broke down"):
+        best_start(result, solid, [(6, 1, 1), (6, 1, 1)])
+
+
+def test_candidates_have_about_as_many_hexahedra_as_asked_for():
+    for ratio in (1.1, 3.0, 8.0):
+        for wanted in (12.0, 300.0, 5000.0, 16000.0):
+            for sections, block, rings in grid_candidates(ratio, wanted):
+                count = sections * block * (block + 4 * rings)
+                assert min(block, rings) >= 1 and sections >= 4
+                assert sections == 4 or abs(count / wanted - 1.0) < 0.15
