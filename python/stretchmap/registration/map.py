@@ -169,8 +169,9 @@ def register(
         volumes are kept below it as they are inside, and no farther (``glide_std`` and
         ``glide_distortion`` of `FillOptions`). ``"frozen"``: they stay where the matching of
         the surfaces put them, which is closer to where a smooth deformation that does not keep
-        volumes would. A map that need not glide, or that gliding would make cross itself, is kept
-        frozen; the result says which it is.
+        volumes would; but where nothing inside can untangle tets, those round them give way. A map
+        that need not glide, or that gliding would make cross itself, is kept frozen; the result
+        says which it is.
     landmark_map : {"smooth", "affine"}
         How landmarks are reached after the surfaces were matched for least distortion of area and
         shape. ``"smooth"``: by the same matching with the landmarks held, kept free of folds by a
@@ -324,9 +325,8 @@ def _fill(
     clock = time.perf_counter()
     source, points = boundary.split.solid, boundary.points
     problem = VolumeProblem.of(
-        source, points, ground=target.surface if glide else None, pinned=marks.source,
-        refine=options.refine,
-    )  # fmt: skip
+        source, points, ground=target.surface, pinned=marks.source, refine=options.refine
+    )
     skin = source.boundary_vertices
     start = problem.x[skin]
     outcome = solve(problem, options, glide=glide, progress=progress)

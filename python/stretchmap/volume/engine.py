@@ -25,7 +25,7 @@ from ..errors import CertificationError
 from ..mesh.refinement import crowded_edges
 from .equalize import equalize
 from .exact_rings import make_rings_exact
-from .ground import glide_on_mesh
+from .ground import glide_on_mesh, untangle_on_mesh
 from .minimize import minimize
 from .model import Budget, History
 from .options import FillOptions, VolumeOptions
@@ -105,6 +105,10 @@ def solve(
     on_mesh = glide and problem.ground is not None
     with run.timed("untangle"):
         left = _untangle(run, glide=glide and not on_mesh)
+        if left and run.problem.ground is not None:
+            freed = untangle_on_mesh(run.problem, options, run.history)
+            if freed is not None:
+                run.x, left = freed, 0
     if left:
         reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")

@@ -18,9 +18,9 @@ from .minimize import Minimized, minimize
 from .model import History
 from .options import FillOptions
 from .problem import VolumeProblem
-from .untangle import folded_faces
+from .untangle import folded_faces, stuck_tets, untangle_patches
 
-__all__ = ["glide_on_mesh"]
+__all__ = ["glide_on_mesh", "untangle_on_mesh"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -28,6 +28,7 @@ _TRIES, _RELEASES = 4, 2
 _MOST_PAIRS = 10_000
 # What is amiss far apart is mended by moving all between, which a coarse solve hardly sees.
 _CG_TOL = 0.01
+_REACHES = (1, 2, 4)  # rings of vertices round inverted tets that may glide
 
 
 def glide_on_mesh(
@@ -74,6 +75,39 @@ def glide_on_mesh(
             break
         held, first, releases = still, options.volume_weight, releases + 1
     return found
+
+
+def untangle_on_mesh(
+    problem: VolumeProblem, options: FillOptions, history: History
+) -> NDArray[np.float64] | None:
+    """Untangle what nothing inside can, the boundary round it gliding on ``problem.ground``.
+
+    Parameters
+    ----------
+    problem : VolumeProblem
+        Its image with few inverted tets, its boundary without crossing faces.
+    options : FillOptions
+    history : History
+
+    Returns
+    -------
+    ndarray, shape (n, 3), or None
+        Without inverted tets and crossing faces; None if that could not be had.
+    """
+    model = problem.model(options)
+    for rings in _REACHES:
+        x, fewest = problem.x, len(model.T) + 1
+        while not history.budget.spent:
+            # Folded faces, too: where some tets cannot be untangled, it is these that hold them.
+            left = stuck_tets(model, x, glide=True)
+            if not 0 < len(left) < fewest:
+                break
+            fewest = len(left)
+            x = untangle_patches(model, x, left, rings=rings, glide=True, budget=history.budget)
+        if not len(stuck_tets(model, x, glide=False)) and not len(_crossing(problem, x)):
+            _log.info("inverted tets untangled by moving the boundary round them")
+            return x
+    return None
 
 
 def _folded(

@@ -13,6 +13,7 @@ from stretchmap.errors import KindError, OptionError
 from stretchmap.volume import engine, ground
 from stretchmap.volume.options import FillOptions
 from stretchmap.volume.problem import VolumeProblem
+from stretchmap.volume.untangle import stuck_tets, untangle_patches
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +123,35 @@ def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
     assert not len(true_crossing(problem, done.x))
     monkeypatch.setattr(ground, "_crossing", lambda p, x: some)
     assert ground.glide_on_mesh(problem, options, history, start=10.0) is None
+
+
+def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps):
+    """A boundary vertex is drawn past its neighbor: what lies below cannot be untangled."""
+    held, surface = maps["frozen"], maps["frozen"].mesh.surface
+    ids, image = held.mesh.boundary_vertices, held.image.copy()
+    vertex = next(i for i in range(300, surface.n_vertices) if ids[i] not in pair.source_landmarks)
+    edge = surface.edges[(surface.edges == vertex).any(axis=1)][0]
+    other = edge[edge != vertex][0]
+    past = image[ids[other]] + 0.5 * (image[ids[other]] - image[ids[vertex]])
+    goal = pair.target.surface
+    tree = _core.maps.SurfaceTree(goal.V, goal.F)
+    image[ids[vertex]] = tree.closest(past[None])[0][0]
+    pinned = pair.source_landmarks.astype(np.int32)
+    problem = VolumeProblem.of(held.mesh, image, ground=goal, pinned=pinned, refine=None)
+    options, model = FillOptions(), problem.model(FillOptions())
+    history = engine.History(model, engine.Budget(60.0))
+    stuck = stuck_tets(model, problem.x, glide=False)
+    inside = untangle_patches(
+        model, problem.x, stuck, rings=4, glide=False, budget=engine.Budget(60.0)
+    )
+    assert len(stuck) and len(stuck_tets(model, inside, glide=False))
+    x = ground.untangle_on_mesh(problem, options, history)
+    assert x is not None and sm.certify(held.mesh, x).certified
+    assert np.array_equal(x[pinned], problem.x[pinned])
+    moved = (x != problem.x).any(axis=1)
+    assert moved[ids[vertex]] and moved.mean() < 0.5
+    still = dataclasses.replace(problem, pinned=ids.astype(np.intp))
+    assert ground.untangle_on_mesh(still, options, history) is None
 
 
 def test_targets_ask_for_what_is_missing_and_no_more(pair, maps):
