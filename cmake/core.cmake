@@ -37,7 +37,8 @@ set(wide cpp/src/volume/tet_weights.cpp cpp/src/volume/tet_weights_avx2.cpp
          cpp/src/linalg/direct/block_update.cpp)
 if(NOT MSVC)
   set_source_files_properties(
-    ${wide} PROPERTIES COMPILE_OPTIONS -ffp-contract=off SKIP_PRECOMPILE_HEADERS ON)
+    ${wide} PROPERTIES COMPILE_OPTIONS -ffp-contract=off SKIP_PRECOMPILE_HEADERS ON
+                       SKIP_UNITY_BUILD_INCLUSION ON)
   if(x86)
     set_source_files_properties(cpp/src/volume/tet_weights_avx2.cpp PROPERTIES
                                 COMPILE_OPTIONS "-ffp-contract=off;-mavx2")
@@ -46,9 +47,15 @@ if(NOT MSVC)
   endif()
 endif()
 
-# Rooms have names of their own in several files, so the core is compiled file by file even with
-# CMAKE_UNITY_BUILD, which wheels use for the bindings.
-set_target_properties(stretchmap_core PROPERTIES UNITY_BUILD OFF)
+# With CMAKE_UNITY_BUILD, as wheels are built, each folder is one unit: what its files share of Eigen
+# is compiled once.
+set_target_properties(stretchmap_core PROPERTIES UNITY_BUILD_MODE GROUP)
+foreach(source IN LISTS core_sources)
+  get_filename_component(folder "${source}" DIRECTORY)
+  string(REGEX REPLACE ".*/cpp/src/" "" folder "${folder}")
+  string(REPLACE "/" "_" folder "${folder}")
+  set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder})
+endforeach()
 
 if(STRETCHMAP_OPENMP)
   find_package(OpenMP COMPONENTS CXX)

@@ -3,19 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "area/cross.hpp"
 #include "stretchmap/area/line_roots.hpp"
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::area {
-
-namespace {
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
-}  // namespace
 
 SurfaceChart surface_chart(const mesh::SurfaceTopology& top, const IndexRows& forms) {
   if (forms.rows() != 2 || forms.cols() != top.edges.rows())

@@ -12,8 +12,8 @@ namespace {
 
 using Eigen::Matrix2d;
 
-constexpr int kTries = 30;
-constexpr double kRidge = 1e-12;  // of the mean diagonal: holds the two translations
+constexpr int kChartTries = 30;
+constexpr double kHoldTranslation = 1e-12;  // of the mean diagonal: holds the two translations
 
 // Inverse edge matrices of triangles given by their areas and cotangents.
 Rows rest_of(const SurfaceReference& reference) {
@@ -37,7 +37,7 @@ ChartNewton::ChartNewton(SurfaceChart chart, SurfaceReference reference, double 
       periods_(std::sqrt(aspect), 1.0 / std::sqrt(aspect)),
       turns_(std::move(turns)),
       rest_(rest_of(reference_)),
-      system_(chart_.faces, chart_.n_vertices, kRidge) {
+      system_(chart_.faces, chart_.n_vertices, kHoldTranslation) {
   const std::vector<Index> faces = folded_faces(chart_, turns_);
   if (!faces.empty())
     throw Error("SolverError", "faces are folded in the chart; Newton steps need a start without",
@@ -106,7 +106,7 @@ ChartStep ChartNewton::step(const TriangleWeights& weights, double reach, const 
   double there = result.before;
   result.step =
       linalg::backtrack(result.before, slope, unfolded_step(chart_, turns_, direction, 0.9, 1.0),
-                        kTries, [&](double t) {
+                        kChartTries, [&](double t) {
                           trial = turns_ + t * direction;
                           return there = value(trial, weights, goal);
                         });

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "area/cross.hpp"
+
 namespace stretchmap::area {
 
 namespace {
@@ -21,8 +23,6 @@ Matrix2d mixed(const Eigen::Matrix<double, 3, 2>& a, const Vector3d& n,
   for (int c = 0; c < 2; ++c) m.col(c) = a.transpose() * n.cross(b.col(c));
   return m;
 }
-
-double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // Whether the horizontal direction `way` lies strictly inside the interval of u of the corners.
 bool inside(const TorusPoint (&p)[3], const Vector2d& way) {

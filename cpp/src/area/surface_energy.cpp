@@ -1,6 +1,6 @@
 #include "stretchmap/area/surface_energy.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +8,7 @@
 #include "area/face_jet.hpp"
 #include "area/facing.hpp"
 #include "stretchmap/area/surface_pattern.hpp"
+#include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::area {
 
@@ -129,9 +130,8 @@ void make_convex(SixSix& matrix) {
   const double size = matrix.diagonal().cwiseAbs().maxCoeff();
   const SixSix shifted = matrix + 1e-12 * size * SixSix::Identity();
   if (Eigen::LLT<SixSix>(shifted).info() == Eigen::Success) return;
-  const Eigen::SelfAdjointEigenSolver<SixSix> eigen(matrix);
-  matrix = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
-           eigen.eigenvectors().transpose();
+  matrix =
+      linalg::map_eigenvalues(matrix, [](double value, double) { return std::max(value, 0.0); });
 }
 
 Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,

@@ -18,8 +18,8 @@ constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts
 constexpr int kBestSteps = 2;        // towards it, of each kind
 constexpr int kStiffSteps = 6;
 constexpr double kGain = 1e-2;  // of a step after which its factor serves again
-constexpr int kTries = 30;
-constexpr double kRidge = 1e-9;  // of the mean diagonal: holds the rotation about the axis
+constexpr int kGlideTries = 30;
+constexpr double kHoldRotation = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
 Points2 as_rows(const Vec& vector) {
   return Eigen::Map<const Points2>(vector.data(), vector.size() / 2, 2);
@@ -36,7 +36,7 @@ Points2 without_rotation(Points2 direction) {
 SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
     : problem_(std::move(problem)),
       angles_(std::move(angles)),
-      system_(problem_.chart.faces, problem_.chart.n_vertices, kRidge) {
+      system_(problem_.chart.faces, problem_.chart.n_vertices, kHoldRotation) {
   const std::vector<Index> faces = folded_faces(problem_.chart, angles_ / kTwoPi);
   if (!faces.empty())
     throw Error("SolverError", "faces are flipped in the chart; Newton steps need a start without",
@@ -54,7 +54,7 @@ NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) 
   Points2 trial;
   double there = here.value;
   result.step =
-      linalg::backtrack(here.value, slope, longest_step(direction), kTries, [&](double t) {
+      linalg::backtrack(here.value, slope, longest_step(direction), kGlideTries, [&](double t) {
         if (poll) poll();
         trial = angles_ + t * direction;
         there = glide_energy(problem_, weights, scale, trial, Derivatives::kNone).value;

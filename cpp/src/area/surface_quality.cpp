@@ -1,6 +1,5 @@
 #include "stretchmap/area/surface_quality.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,25 +8,13 @@
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/torus.hpp"
+#include "stretchmap/mesh/rounded_triangle.hpp"
 
 namespace stretchmap::area {
 
 namespace {
 
 using Eigen::Matrix2d;
-
-// The triangle with edges `edges` from its first corner, made rounder where it is too long.
-Matrix2d rounded(const Matrix2d& edges, double max_aspect) {
-  Matrix2d regular;
-  regular << 1.0, 0.5, 0.0, 0.8660254037844386;
-  const Matrix2d map = edges * regular.inverse();
-  // |map|^2 / (2 det) = (a + 1/a) / 2 for the ratio a of the singular values.
-  if (map.squaredNorm() <= map.determinant() * (max_aspect + 1.0 / max_aspect)) return edges;
-  const Eigen::JacobiSVD<Matrix2d> svd(map, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double size = std::sqrt(map.determinant() * max_aspect);
-  const Eigen::Vector2d sigma(size, size / max_aspect);
-  return svd.matrixU() * sigma.asDiagonal() * svd.matrixV().transpose() * regular;
-}
 
 }  // namespace
 
@@ -46,7 +33,7 @@ SurfaceReference surface_reference(const PointsRef& points, const FacesRef& face
     }
     Matrix2d edges;
     edges << base, a.dot(b) / base, 0.0, twice / base;
-    edges = rounded(edges, max_aspect);
+    edges = mesh::rounded_triangle(edges, max_aspect);
     const Eigen::Vector2d p = edges.col(0), q = edges.col(1);
     reference.cotan.row(f) << p.dot(q) / twice, p.dot(p - q) / twice, q.dot(q - p) / twice;
   }

@@ -13,7 +13,7 @@ namespace {
 // A little give in the ring equations makes the system quasi-definite, and then it has a
 // factorization in any order. The solution is refined against the equations without it.
 constexpr double kGive = 1e-9;
-constexpr double kRidge = 1e-10;  // holds the rotation about the axis
+constexpr double kRingRidge = 1e-10;  // holds the rotation about the axis
 constexpr int kRefinements = 3;
 constexpr double kAccuracy = 1e-7;
 
@@ -69,7 +69,7 @@ SparseMatrix with_give(SparseMatrix matrix) {
   double coupling = 0.0;
   for (Index i = 2; i < 3 * n; i += 3) coupling += matrix.row(i).squaredNorm() / n;
   for (Index i = 0; i < 3 * n; ++i)
-    matrix.coeffRef(i, i) += i % 3 == 2 ? -kGive * coupling / size : kRidge * size;
+    matrix.coeffRef(i, i) += i % 3 == 2 ? -kGive * coupling / size : kRingRidge * size;
   return matrix;
 }
 

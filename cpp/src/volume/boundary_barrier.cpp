@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "stretchmap/mesh/rounded_triangle.hpp"
+
 namespace stretchmap::volume {
 
 using Eigen::Vector3d;
@@ -135,21 +137,10 @@ Vec least_facing(const GlidingBoundary& boundary, const PointsRef& x) {
 Rows rest_triangles(const PointsRef& V, const FacesRef& faces, double scale, double max_aspect) {
   const Index m = static_cast<Index>(faces.rows());
   const double length = std::sqrt(scale);
-  Eigen::Matrix2d regular;
-  regular << 1.0, 0.5, 0.0, std::sqrt(3.0) / 2.0;
-  const Eigen::Matrix2d regular_inverse = regular.inverse();
   Rows rest(m, 4);
   for (Index f = 0; f < m; ++f) {
-    Eigen::Matrix2d edges = mesh::plane_edges(V, faces, f);
-    const Eigen::JacobiSVD<Eigen::Matrix2d> svd(edges * regular_inverse,
-                                                Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Eigen::Vector2d sigma = svd.singularValues();
-    const double floor = sigma[0] / max_aspect;
-    if (sigma[1] < floor) {
-      const double stretch = std::sqrt(sigma[1] / floor);
-      edges = svd.matrixU() * Eigen::Vector2d(stretch * sigma[0], stretch * floor).asDiagonal() *
-              svd.matrixV().transpose() * regular;
-    }
+    const Eigen::Matrix2d edges =
+        mesh::rounded_triangle(mesh::plane_edges(V, faces, f), max_aspect);
     const Eigen::Matrix2d inverse = (length * edges).inverse();
     rest.row(f) << inverse(0, 0), inverse(0, 1), inverse(1, 0), inverse(1, 1);
   }

@@ -1,8 +1,9 @@
 #include "linalg/multigrid/dense_inverse.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
+
+#include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::linalg {
 namespace {
@@ -24,17 +25,11 @@ void DenseInverse::set(const Pattern& pattern, const std::vector<double>& values
         for (int c = 0; c < block; ++c)
           dense(i * block + r, pattern.col[e] * block + c) =
               values[static_cast<size_t>(block * block) * e + block * r + c];
-  const Eigen::LLT<Eigen::MatrixXd> llt(dense);
-  Eigen::MatrixXd inverse;
-  if (llt.info() == Eigen::Success) {
-    inverse = llt.solve(Eigen::MatrixXd::Identity(n_, n_));
-  } else {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(dense);
-    const Eigen::VectorXd size = eigen.eigenvalues().cwiseAbs();
-    const double floor = std::max(1e-8 * size.maxCoeff(), 1e-300);
-    inverse = eigen.eigenvectors() * size.cwiseMax(floor).cwiseInverse().asDiagonal() *
-              eigen.eigenvectors().transpose();
-  }
+  Eigen::MatrixXd inverse(n_, n_);
+  if (!invert_positive(dense, inverse))
+    inverse = map_eigenvalues(dense, [](double value, double largest) {
+      return 1.0 / std::max({std::abs(value), 1e-8 * largest, 1e-300});
+    });
   const Eigen::MatrixXf symmetric = (0.5 * (inverse + inverse.transpose())).cast<float>();
   inverse_.assign(symmetric.data(), symmetric.data() + symmetric.size());
 }

@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "stretchmap/linalg/symmetric.hpp"
+
 namespace stretchmap::linalg {
 namespace {
 
@@ -72,6 +74,19 @@ class BlockRowSum<3> {
   Pair pair_[4];
   double last_ = 0.0;
 };
+
+// Whether the block is positive definite; its inverse if so. Only the finest level has many rows,
+// whose blocks are small.
+template <int B>
+bool invert(const ColBlock<double, B>& block, ColBlock<double, B>& inverse) {
+  if constexpr (B > 3) {
+    return invert_positive(block, inverse);
+  } else {
+    if (Eigen::LLT<ColBlock<double, B>>(block).info() != Eigen::Success) return false;
+    inverse = block.inverse();
+    return true;
+  }
+}
 
 }  // namespace
 
@@ -187,17 +202,15 @@ std::vector<Index> LevelMatrix<B>::set_diagonals() {
   for_chunks(n, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
       Eigen::Map<RowBlock<double, B>> block(diagonal.data() + kSize * i);
-      const Eigen::LLT<ColBlock<double, B>> llt(block);
-      bad[i] = llt.info() != Eigen::Success || !block.allFinite();
+      ColBlock<double, B> inverse = ColBlock<double, B>::Zero();
+      bad[i] = !block.allFinite() || !invert(ColBlock<double, B>(block), inverse);
       if (bad[i]) {
-        const Eigen::SelfAdjointEigenSolver<ColBlock<double, B>> eigen(block);
-        const auto size = eigen.eigenvalues().cwiseAbs().eval();
-        const double floor = std::max(1e-6 * size.maxCoeff(), 1e-30);
-        block = eigen.eigenvectors() * size.cwiseMax(floor).asDiagonal() *
-                eigen.eigenvectors().transpose();
+        block = map_eigenvalues(block, [](double eigenvalue, double largest) {
+          return std::max({std::abs(eigenvalue), 1e-6 * largest, 1e-30});
+        });
+        invert(ColBlock<double, B>(block), inverse);
       }
-      Eigen::Map<ColBlock<float, B>>(inverse_f.data() + kSize * i) =
-          block.inverse().template cast<float>();
+      Eigen::Map<ColBlock<float, B>>(inverse_f.data() + kSize * i) = inverse.template cast<float>();
     }
   });
   std::vector<Index> rows;
