@@ -22,13 +22,17 @@ def regression() -> ModuleType:
     return module
 
 
+def row(name: str, milliseconds: float) -> dict[str, Any]:
+    return {"name": f"{name}/threads:1", "cpu_time": milliseconds}
+
+
 def rows(factor: float = 1.0, slow: float = 1.0, flips: int = 0) -> list[dict[str, Any]]:
-    """A made-up run: copies at 1 GB/s, everything ``factor`` slower, one stage ``slow`` besides."""
+    """A made-up run, copies at 1 GB/s: everything ``factor`` slower, one stage ``slow`` besides."""
     return [
-        {"name": "bandwidth/copy/threads:1", "real_time": 1.0, "bytes_per_second": 1e9 / factor},
-        {"name": "sample/9/threads:1", "real_time": 7.0},
-        {"name": "volume.assemble/9/threads:1", "real_time": 2.0 * factor, "bytes": 1e6},
-        {"name": "volume.vsem/9/threads:1", "real_time": 8.0 * factor * slow, "flips": flips},
+        {**row("bandwidth/copy", 1.0), "real_time": 2.0, "bytes_per_second": 0.5e9 / factor},
+        row("sample/9", 7.0),
+        {**row("volume.assemble/9", 2.0 * factor), "bytes": 1e6},
+        {**row("volume.vsem/9", 8.0 * factor * slow), "flips": flips},
     ]
 
 
@@ -56,8 +60,8 @@ def test_a_slower_stage_and_a_wrong_result_are(regression: ModuleType) -> None:
 def test_everything_slower_is(regression: ModuleType) -> None:
     base = regression.summarize([rows()])
     slower = copy.deepcopy(rows())
-    for row in slower[1:]:
-        row["real_time"] *= 3.0
+    for stage in slower[1:]:
+        stage["cpu_time"] *= 3.0
     found = regression.regressions(regression.summarize([slower]), base, 1.6)
     assert found == ["all stages: 3.00 times the baseline"]
 
@@ -77,3 +81,44 @@ def test_the_executable_itself(
     stored.write_text(base.replace('genus": 1', 'genus": 2'))
     assert regression.main([*common, "--margin", "1e6"]) == 1
     assert "genus: 1 instead of 2" in capsys.readouterr().out
+
+
+def test_another_processor_needs_a_baseline_of_its_own(
+    regression: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored = tmp_path / "baseline.json"
+    stored.write_text('{"a slide rule": {}}')
+    executable = tmp_path / "stretchmap_bench"
+    executable.touch()
+    assert regression.main(["--baseline", str(stored), "--executable", str(executable)]) == 2
+    assert "--update" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.timing
+def test_nothing_got_slower_than_the_baseline(
+    regression: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = regression.main([])
+    printed = capsys.readouterr()
+    if code == 2:
+        pytest.skip(printed.err.strip())
+    assert code == 0, printed.out
+
+
+@pytest.mark.slow
+@pytest.mark.timing
+def test_a_stage_slowed_on_purpose_is_found(
+    regression: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    if regression.find_executable() is None:
+        pytest.skip("stretchmap_bench is not built")
+    common = ["--baseline", str(tmp_path / "baseline.json"), "--size", "3000"]
+    assert regression.main([*common, "--update"]) == 0
+    area_map = regression.sm.area_map
+    monkeypatch.setattr(regression.sm, "area_map", lambda s: [area_map(s) for _ in range(4)][-1])
+    assert regression.main(common) == 1
+    assert "REGRESSION map.area/3000" in capsys.readouterr().out
