@@ -62,9 +62,18 @@ def boundary_starts(
         yield steps(_STEPS)
         yield steps(0)
         return
-    # Faces that look inward cost the interior more steps than unfolding them beforehand.
-    folded = not first.certificate.certified
-    yield of_the_solid(steps(0) if folded else first)
-    yield of_the_solid(steps(_STEPS))
-    if folded:
+    if first.certificate.certified:
+        yield of_the_solid(first)
+        yield of_the_solid(steps(_STEPS))
+        return
+    # Faces that look inward cost the interior more steps than unfolding them beforehand; but where
+    # that gets stuck, it leaves needles that no gliding opens again.
+    unfolded = steps(0)
+    if unfolded.history[-1].flips:
+        yield of_the_solid(first)
+        yield of_the_solid(unfolded)
+        yield of_the_solid(steps(_STEPS))
+    else:
+        yield of_the_solid(unfolded)
+        yield of_the_solid(steps(_STEPS))
         yield of_the_solid(first)
