@@ -2,7 +2,8 @@
 
 python bench/population/coordinates.py --shapes 4 --tets 4000
 
-The rule for the origin is tried on a body moved and renumbered, and on finer meshes of one body.
+The rule for the origin is tried on a body moved and renumbered, and on other meshes of a body
+without mirror planes: how far the origin moves, and how far coordinates differ apart from that.
 Transfer and linearity errors are those of Cobiveco (Schuler et al. 2021, arXiv 2102.02898):
 positions of the vertices carried as a field to the vertices of the other mesh and back by
 (u, v, s), as a share of the size; and along lines of one coordinate, the others held, how far the
@@ -28,6 +29,17 @@ def turned(solid: sm.TetMesh, seed: int) -> sm.TetMesh:
     order = random.permutation(solid.n_vertices)
     rank = np.argsort(order).astype(np.int32)
     return sm.TetMesh(solid.V[order] @ Q.T + 3.0, rank[solid.T])
+
+
+def skewed(n_tets: int) -> sm.TetMesh:
+    """The sample vertebra bent, twisted and swollen on one side: no mirror plane is left."""
+    solid = sm.samples.vertebra_like(n_tets)
+    size = np.linalg.norm(np.ptp(solid.V, axis=0))
+    x, y, z = (solid.V / size).T
+    turn = 1.2 * z + 0.8 * x
+    along, across = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
+    bent = [along * (1.0 + 0.5 * across), across, z + 0.6 * along * across + 0.3 * along]
+    return sm.TetMesh(size * np.column_stack(bent), solid.T)
 
 
 def difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -100,14 +112,20 @@ def main() -> None:
         du, dv = (np.median(difference(one[known, k], other[known, k])) for k in range(2))
         sure = ", ".join(f"{s:.3f}" for s in sm.origin_of(found).sureness)
         print(f"  bone {i} moved and renumbered: u {du:.2f}, v {dv:.2f}; moments {sure}")
-    solid = sm.samples.vertebra_like(options.tets)
-    coarse, points = sm.volume_map(solid), solid.V[solid.T].mean(axis=1)
-    for times in (2, 4):
-        fine = sm.volume_map(sm.samples.vertebra_like(times * options.tets))
-        one, other = coordinates(coarse, points), coordinates(fine, points)
-        du, dv = (np.nanmedian(difference(one[:, k], other[:, k])) for k in range(2))
-        ds = np.nanmedian(np.abs(one[:, 2] - other[:, 2]))
-        print(f"  a mesh of {times} times as many tets: u {du:.2f}, v {dv:.2f}; s {ds:.4f} of r")
+    solid = skewed(options.tets)
+    given, points = sm.volume_map(solid), solid.V[solid.T].mean(axis=1)
+    for times in (1.5, 2, 4):
+        other = sm.volume_map(skewed(int(times * options.tets)))
+        one, two = coordinates(given, points), coordinates(other, points)
+        ahead = np.exp(1j * (one - two)[np.isfinite(one + two).all(axis=1), :2])
+        begin = ahead.mean(axis=0)
+        rest = np.median(np.abs(np.angle(ahead / begin)), axis=0)
+        (u, v), (du, dv) = np.degrees(np.abs(np.angle(begin))), np.degrees(rest)
+        print(
+            f"  {times:g} times as many tets: origin off by u {u:.1f}, v {v:.1f}; points apart "
+            f"from that u {du:.1f}, v {dv:.1f}; "
+            f"s {np.nanmedian(np.abs((one - two)[:, 2])):.3f} of r"
+        )
     print("transfer there and back, % of the size: median, 95 %, worst")
     for i in range(1, len(maps)):
         errors = 100.0 * transfer(maps[0], maps[i])

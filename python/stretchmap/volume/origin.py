@@ -7,8 +7,8 @@ decide, or the shape: with x the place of a tet in the body, c the body's center
 
 u begins at the phase of M_1(u), the direction round the hole in which the body reaches farthest,
 and v at the phase of M_1(v). Both angles may be reversed together, and nothing else keeps
-orientation: they run so that the imaginary part of the larger of the second moments, M_2(u) and
-M_2(v) taken from there, is positive. A body with a mirror plane leaves that sign open.
+orientation: they run so that the imaginary part of the largest of M_2(u), M_2(v) and M_1(2 u - v),
+taken from there, is positive. A body with mirror planes across both leaves that sign open.
 """
 
 from __future__ import annotations
@@ -116,9 +116,11 @@ def origin_of(result: MapResult, landmarks: ArrayLike | None = None) -> Origin:
 
     first = moment(u, 1), moment(v, 1)
     begin = [float(np.angle(m)) for m in first]
+    ahead, across = u - begin[0], v - begin[1]
     odd = max(
-        (moment(a - b, 2).imag for a, b in zip((u, v), begin, strict=True)), key=abs
-    )  # fmt: skip
+        (moment(ahead, 2).imag, moment(across, 2).imag, moment(2.0 * ahead - across, 1).imag),
+        key=abs,
+    )
     return Origin(
         begin[0], begin[1], 1 if odd >= 0.0 else -1, (abs(first[0]), abs(first[1]), abs(odd))
     )

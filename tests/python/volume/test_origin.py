@@ -33,6 +33,32 @@ def test_a_moved_and_renumbered_body_has_the_same_coordinates(found):
     assert (apart(one[order, :2], other[:, :2]) < 5.0).all()
 
 
+def skewed(n_tets):
+    """A vertebra bent, twisted and swollen on one side."""
+    solid = sm.samples.vertebra_like(n_tets)
+    size = np.linalg.norm(np.ptp(solid.V, axis=0))
+    x, y, z = (solid.V / size).T
+    turn = 1.2 * z + 0.8 * x
+    a, b = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
+    bent = np.column_stack([a * (1.0 + 0.5 * b), b, z + 0.6 * a * b + 0.3 * a])
+    return sm.TetMesh(size * bent, solid.T)
+
+
+def test_another_mesh_of_the_same_body_begins_at_the_same_place():
+    solid = skewed(2000)
+    points = solid.V[solid.T].mean(axis=1)
+    one, other = (sm.volume_map(body) for body in (solid, skewed(4000)))
+    begin = [sm.origin_of(found) for found in (one, other)]
+    assert min(b.sureness[2] for b in begin) > 0.02
+    given = [found.coordinates(points) for found in (one, other)]
+    known = np.isfinite(given[0] + given[1]).all(axis=1)
+    assert known.mean() > 0.98
+    here, there = (b.coordinates(g[known])[:, :2] for b, g in zip(begin, given, strict=True))
+    moved = np.degrees(np.abs(np.angle(np.exp(1j * (here - there)).mean(axis=0))))
+    assert (moved < [1.5, 3.0]).all()
+    assert (apart(here, there) < [4.0, 10.0]).all()
+
+
 def test_the_origin_does_not_depend_on_where_the_map_began(found):
     """Coordinates turned and reversed beforehand come out the same."""
 
