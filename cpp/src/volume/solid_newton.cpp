@@ -16,6 +16,7 @@ constexpr double kShifts[] = {0.0, 1e-8, 1e-4, 1e-1, 10.0};
 constexpr double kRounding = 1e-12;   // a predicted decrease that is no more of the energy is none
 constexpr double kEnergyShare = 0.2;  // see SolveOptions
 constexpr int kTries = 21;            // of the line search
+constexpr int kProjected = 8;  // new Hessians without negative parts after one was indefinite
 constexpr int kEasings = 6;
 constexpr double kRise = 0.01;       // of the decrease predicted, by a single element: uphill
 constexpr double kWorthwhile = 0.2;  // of the decrease predicted
@@ -191,6 +192,7 @@ bool SolidNewton::solve_projected(const PointsRef& x, EnergyWeights w, const New
                                   const Poll& poll, Points& direction, NewtonReport& report) {
   changes_.clear();
   const bool projected = w.negative == 0.0;
+  if (!projected) projected_ = kProjected;
   w.negative = 0.0;
   if (projected)
     solver_->refactor();
@@ -203,7 +205,8 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
                                const NewtonOptions& options, const Poll& poll) {
   NewtonReport report;
   EnergyWeights w = weights;
-  w.negative = options.negative;
+  w.negative = projected_ > 0 ? 0.0 : options.negative;
+  if (projected_ > 0 && !options.keep_hessian) --projected_;
   report.before = report.after = energy_.value(x, w);
   if (!std::isfinite(report.before.energy))
     throw Error("SolverError", "the energy is infinite: " + std::to_string(report.before.flips) +

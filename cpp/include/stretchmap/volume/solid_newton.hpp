@@ -78,6 +78,7 @@ class SolidNewton {
 
   SolidEnergy energy_;
   std::unique_ptr<linalg::BlockSolver> solver_;
+  int projected_ = 0;              // Hessians still to be made without negative parts
   Points gradient_;                // at the current point
   Vec last_gradient_, last_step_;  // before the last step, and the step; empty after a renewal
   std::vector<Change> changes_;    // since the Hessian was renewed
