@@ -253,7 +253,9 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
         with run.timed("frozen"):
             first = o.volume_weight if run.problem.warm else min(1.0, goal)
             done = minimize(history.model, run.x, history, glide=False, start=first, goal=goal)
-        run.x, converged, reason, newton = done.x, done.converged, done.reason, done.newton
+        run.x, converged, reason = done.x, done.converged, done.reason
+        newton = None if glide else done.newton
+        del done  # the next stage has a Hessian of its own, and memory need not hold both
     if glide:
         with run.timed("glide"):
             first = o.volume_weight if run.problem.warm else goal
