@@ -155,13 +155,13 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     if glide:
         run.x = untangle_whole(history.model, run.x, history, glide=True).x
         stuck = _patched(run, glide=True)
-    best, fewest = run.problem, len(stuck)
+    best, fewest, least = run.problem, len(stuck), _inverted(run)
     for _ in range(_ROUNDS):
         if not len(stuck) or run.problem.refinement is None or history.budget.spent:
             break
         if len(stuck) > min(_MOST_STUCK * run.problem.solid.n_tets, _TIMES * fewest + _MORE):
             break
-        if not len(stuck_tets(history.model, run.x, glide=False)):
+        if not _inverted(run):
             break  # folded faces are left, which more vertices inside do not unfold
         n = run.problem.solid.n_vertices
         run.take(run.problem.halved(crowded_edges(run.problem.solid, stuck)))
@@ -170,19 +170,24 @@ def _untangle(run: _Run, *, glide: bool) -> int:
             len(stuck), run.problem.solid.n_vertices - n,
         )  # fmt: skip
         stuck = _patched(run, glide=glide)
-        if len(stuck) < fewest:
-            best, fewest = run.problem, len(stuck)
+        # Folded faces can be held, inverted tets cannot.
+        inverted = _inverted(run)
+        if (inverted, len(stuck)) < (least, fewest):
+            best, fewest, least = run.problem, len(stuck), inverted
     if fewest and len(stuck):
         run.take(best)
-        inverted = len(stuck_tets(history.model, run.x, glide=False))
-        if inverted or not glide:
-            return inverted
+        if least or not glide:
+            return least
         _hold_folded(run)
     # Away from folding: the nearer to it, the shorter are all steps that follow.
     away = untangle_whole(history.model, run.x, history, glide=glide)
     if not away.left and not len(stuck_tets(history.model, away.x, glide=glide)):
         run.x = away.x
     return 0
+
+
+def _inverted(run: _Run) -> int:
+    return len(stuck_tets(run.history.model, run.x, glide=False))
 
 
 def _untangle_inside(run: _Run) -> NDArray[np.intp]:

@@ -7,6 +7,7 @@ energy is the energy divided by lambda: it cannot rise, neither in a step nor wh
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .model import History, SolidModel
+from .options import FillOptions
 
 __all__ = ["Minimized", "minimize"]
 
@@ -22,6 +24,9 @@ _DRIFT = 1e-4  # of the volume enclosed, before targets are set anew
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
+# Energy of a torus map from which on gains are measured against this, and not against itself: a
+# poor map has more to gain, and few steps that gain little tell nothing.
+_FAIR = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +95,8 @@ def minimize(
     stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
     tolerance = o.glide_tol if glide else o.frozen_tol
     face, on_mesh = o.face_weight if glide else 0.0, glide and model.ground is not None
+    volumes_alone = glide and not on_mesh and o.volume_weight >= FillOptions.volume_weight
+    fair = _FAIR if volumes_alone else math.inf
     newton = model.newton(x, glide=glide)
     if not glide:
         newton.set_targets(model.targets)
@@ -116,7 +123,8 @@ def minimize(
         )
         # A step that few tets cut short, or from a poor solve, gains little and proves nothing.
         predicted = 0.5 * step.decrement / weight
-        small = max(before - after, predicted) <= tolerance * before and not step.negative_curvature
+        enough = tolerance * min(before, fair)
+        small = max(before - after, predicted) <= enough and not step.negative_curvature
         if on_mesh and model.kept(x):
             return Minimized(x, True, "volumes are kept", newton)
         if weight < goal:

@@ -78,7 +78,7 @@ class FillOptions:
     refine: bool = True
     time_limit: float = 1e-3
     volume_weight: float = _MOST_WEIGHT
-    growth: float = 2.0
+    growth: float = 1.5
     max_aspect: float = 6.0
     floor: float = 0.02
     untangle_iter: int = 400

@@ -9,6 +9,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap.area.map import finished
+from stretchmap.volume import engine
 from stretchmap.volume import map as volume_module
 from stretchmap.volume.boundary_starts import boundary_starts
 from stretchmap.volume.minimize import minimize
@@ -109,6 +110,23 @@ def test_the_first_start_has_no_folded_face_if_that_can_be_had():
     starts = list(boundary_starts(solid, VolumeOptions(), glide=True, progress=None))
     assert [start.certificate.certified for start in starts] == [True, True, False]
     assert (starts[2].angles == plain.angles).all()
+
+
+def test_folded_faces_are_better_than_inverted_tets(problem, monkeypatch):
+    """Halving cures the one inverted tet at the price of more folded faces, which can be held."""
+    run = engine._Run(
+        problem, VolumeOptions(), History(problem.model(VolumeOptions()), Budget(60.0))
+    )
+    n, held = problem.solid.n_vertices, []
+    halved = lambda run: run.problem.solid.n_vertices > n  # noqa: E731
+    monkeypatch.setattr(engine, "_untangle_inside", lambda run: np.arange(3))
+    monkeypatch.setattr(
+        engine, "_patched", lambda run, glide: np.arange(5) if halved(run) else np.arange(3)
+    )
+    monkeypatch.setattr(engine, "_inverted", lambda run: 0 if halved(run) else 1)
+    monkeypatch.setattr(engine, "_hold_folded", lambda run: held.append(halved(run)))
+    assert engine._untangle(run, glide=True) == 0
+    assert held == [True]
 
 
 def test_an_unfinished_area_map_can_be_finished():
