@@ -1,0 +1,141 @@
+"""What of a volume map runs on one thread only, stage by stage.
+
+    python bench/scaling.py [CASE ...] [--method certified|vsem] [--json FILE] [--write]
+
+A case is a file of a mesh or a number of tets of a generated solid torus. The map is made with two
+threads that sleep while they have nothing to do. Then the processor time of the first is what is
+serial and half of what is parallel, that of the second the other half: their difference is the
+serial part, whoever else uses the machine. A stage ends when its last step is reported; what leads
+to its first step counts with it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from speed import write
+
+HERE = Path(__file__).resolve().parent
+PACKAGE = HERE.parent / "python"
+METHODS: dict[str, dict[str, Any]] = {
+    "certified": {},
+    "vsem": {"method": "vsem", "c": 10.0, "max_iter": 20},
+}
+LAST = "certificate, result"
+
+
+class Stages:
+    """A progress callback that shares out time among the stages it is told of."""
+
+    def __init__(self) -> None:
+        self.rows: dict[str, dict[str, float]] = {}
+        self._then = self._now()
+
+    @staticmethod
+    def _now() -> tuple[float, float, float]:
+        return time.perf_counter(), time.process_time(), time.thread_time()
+
+    def __call__(self, stage: str, done: int, total: int, **values: float) -> None:
+        now = self._now()
+        wall, both, first = (b - a for a, b in zip(self._then, now, strict=True))
+        row = self.rows.setdefault(stage, {"wall": 0.0, "processor": 0.0, "serial": 0.0})
+        row["wall"] += wall
+        row["processor"] += both
+        row["serial"] += max(first - (both - first), 0.0)
+        self._then = now
+
+
+def worker(case: str, method: str) -> dict[str, Any]:
+    """The map of one case in this process."""
+    import numpy as np
+
+    import stretchmap as sm
+
+    # Modules imported on first use are none of the mesh's business.
+    sm.volume_map(sm.samples.solid_torus(500), **METHODS[method])
+    if case.isdigit():
+        solid = sm.samples.solid_torus(int(case))
+    else:
+        with np.load(case) as arrays:
+            solid = sm.TetMesh(arrays["V"], arrays["T"])
+    stages = Stages()
+    result = sm.volume_map(solid, progress=stages, **METHODS[method])
+    stages(LAST, 1, 1)
+    return {
+        "case": Path(case).stem,
+        "method": method,
+        "tets": solid.n_tets,
+        "certified": result.certificate.certified,
+        "stages": stages.rows,
+    }
+
+
+def run(case: str, method: str, threads: int) -> dict[str, Any]:
+    """`worker` in a process of its own."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(PACKAGE),
+        "OMP_NUM_THREADS": str(threads),
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_WAIT_POLICY": "passive",
+    }
+    command = [sys.executable, str(Path(__file__).resolve()), "--worker", case, "--method", method]
+    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return row
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """A line per stage and case."""
+    lines = [
+        "| mesh | tets | method | stage | processor s | serial s | serial share |",
+        "|---|---:|---|---|---:|---:|---:|",
+    ]
+    for row in rows:
+        both = {key: 0.0 for key in ("processor", "serial")}
+        for values in row["stages"].values():
+            both = {key: total + values[key] for key, total in both.items()}
+        for stage, values in [*row["stages"].items(), ("all", both)]:
+            share = values["serial"] / max(values["processor"], 1e-9)
+            lines.append(
+                f"| {row['case']} | {row['tets']:,} | {row['method']} | {stage} "
+                f"| {values['processor']:.2f} | {values['serial']:.2f} | {100.0 * share:.0f} % |"
+            )
+    return "\n".join(lines)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure or draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("cases", nargs="*", default=["100000"])
+    parser.add_argument("--method", choices=list(METHODS), default="certified")
+    parser.add_argument("--json", type=Path, help="where the rows go")
+    parser.add_argument("--draw", type=Path, help="rows to draw the table of")
+    parser.add_argument("--write", action="store_true", help="put the table on docs/speed.md")
+    parser.add_argument("--worker", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.worker:
+        print(json.dumps(worker(options.worker, options.method)))
+        return 0
+    if options.draw:
+        rows = json.loads(options.draw.read_text())
+    else:
+        rows = [run(case, options.method, 2) for case in options.cases]
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(rows, indent=1) + "\n")
+    print(table(rows))
+    if options.write:
+        write("scaling", table(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,192 @@
+"""Two builds side by side: processor time, time by the clock, memory and quality of volume maps.
+
+    python bench/speed.py --before FOLDER [--after FOLDER] [--json docs/data/speed.json] [--write]
+    python bench/speed.py --draw docs/data/speed.json        # the table again, nothing measured
+
+FOLDER holds the built package ``stretchmap``: the ``python`` folder of a checkout built in place,
+or ``site-packages``. Every run is a process of its own, and the two builds take turns, so that both
+see the same neighbors. Of repeated runs the one with the least processor time counts. Wall time
+means something on an idle machine only; processor time, that of all threads, nearly everywhere.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+PAGE = HERE.parent / "docs" / "speed.md"
+MESHES = ("petal_ring_synth_14506", "vertebra_L3_ssm_16420", "rocker_arm_25182", "kitten_21584")
+
+
+def worker(job: dict[str, Any]) -> dict[str, Any]:
+    """One map in this process, by whatever ``stretchmap`` is on the path."""
+    import resource
+    import time
+
+    import numpy as np
+
+    import stretchmap as sm
+
+    def peak() -> int:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+    # Modules imported on first use are none of the mesh's business.
+    sm.volume_map(sm.samples.solid_torus(500), **job["arguments"])
+    if Path(job["mesh"]).suffix:
+        with np.load(job["mesh"]) as arrays:
+            solid = sm.TetMesh(arrays["V"], arrays["T"])
+    else:
+        solid = sm.samples.solid_torus(int(job["mesh"]))
+    base, cpu, wall = peak(), time.process_time(), time.perf_counter()
+    result = sm.volume_map(solid, **job["arguments"])
+    cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+    tets = result.mesh.T
+    source, image = (
+        np.linalg.det(points[tets[:, 1:]] - points[tets[:, :1]])
+        for points in (result.mesh.V, result.image)
+    )
+    ratios = (image / image.sum()) / (source / source.sum())
+    return {
+        "tets": solid.n_tets,
+        "processor_seconds": cpu,
+        "wall_seconds": wall,
+        "bytes_per_tet": (peak() - base) / solid.n_tets,
+        "ratio_std": float(ratios.std()),
+        "flips": int(np.count_nonzero(ratios <= 0.0)),
+        "certified": bool(result.certificate.certified),
+        "steps": len(result.history),
+    }
+
+
+def run(package: Path, job: dict[str, Any], threads: int) -> dict[str, Any]:
+    """`worker` in a process of its own with the package of that folder."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(package),
+        "OMP_NUM_THREADS": str(threads),
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_WAIT_POLICY": "passive",
+    }
+    command = [sys.executable, str(Path(__file__).resolve()), "--worker", json.dumps(job)]
+    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return row
+
+
+def measure(options: argparse.Namespace) -> dict[str, Any]:
+    """Rows of all cases, methods and numbers of threads; each build's best of the repeats."""
+    builds = {"before": options.before, "after": options.after}
+    methods: dict[str, dict[str, Any]] = {
+        "certified": {},
+        "vsem": {"method": "vsem", "c": 10.0, "max_iter": 20},
+    }
+    rows: list[dict[str, Any]] = []
+    for case in options.cases:
+        file = options.meshes / f"{case}.npz"
+        mesh = str(file) if file.exists() else case
+        for method in options.methods:
+            job = {"mesh": mesh, "arguments": methods[method]}
+            for threads in options.threads:
+                best: dict[str, dict[str, Any]] = {}
+                for _ in range(options.repeat):
+                    for name, package in builds.items():
+                        row = run(package, job, threads)
+                        least = best.setdefault(name, row)
+                        if row["processor_seconds"] < least["processor_seconds"]:
+                            best[name] = row
+                for name, row in best.items():
+                    rows.append(
+                        {"case": case, "method": method, "threads": threads, "build": name, **row}
+                    )
+                    print(rows[-1], flush=True)
+                save(options, rows)
+    return save(options, rows)
+
+
+def save(options: argparse.Namespace, rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """All there is so far, in the file if one is asked for."""
+    machine = {"processor": platform.machine(), "cores": os.cpu_count()}
+    data = {"machine": machine, "labels": options.labels, "rows": rows}
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(data, indent=1) + "\n")
+    return data
+
+
+def table(data: dict[str, Any]) -> str:
+    """Of all rows, the two builds side by side."""
+    found: dict[tuple[str, str, int], dict[str, dict[str, Any]]] = {}
+    for row in data["rows"]:
+        found.setdefault((row["case"], row["method"], row["threads"]), {})[row["build"]] = row
+    before, after = data["labels"]
+    lines = [
+        f"Before: {before}; after: {after}. Microseconds of processor time and bytes per tet.",
+        "",
+        "| mesh | tets | method | threads | µs before | µs after | ratio | wall s before | after "
+        "| bytes before | after | SD of ratios before | after | certified |",
+        "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---|",
+    ]
+    for (case, method, threads), pair in found.items():
+        if len(pair) < 2:
+            continue
+        old, new = pair["before"], pair["after"]
+        micro = [1e6 * row["processor_seconds"] / row["tets"] for row in (old, new)]
+        name = f"torus {int(case):,}" if case.isdigit() else case
+        lines.append(
+            f"| {name} | {new['tets']:,} | {method} | {threads} | {micro[0]:.1f} | {micro[1]:.1f} "
+            f"| {micro[1] / micro[0]:.2f} | {old['wall_seconds']:.1f} | {new['wall_seconds']:.1f} "
+            f"| {old['bytes_per_tet']:.0f} | {new['bytes_per_tet']:.0f} "
+            f"| {old['ratio_std']:.4f} | {new['ratio_std']:.4f} "
+            f"| {'yes' if new['certified'] else 'no'} |"
+        )
+    return "\n".join(lines)
+
+
+def write(name: str, text: str) -> None:
+    """Put a table between its two marks on the page."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    head, rest = PAGE.read_text().split(begin)
+    PAGE.write_text(head + begin + "\n\n" + text + "\n\n" + end + rest.split(end)[1])
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure or draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--before", type=Path, help="folder of the package to compare with")
+    parser.add_argument("--after", type=Path, default=HERE.parent / "python")
+    parser.add_argument("--labels", nargs=2, default=("0.1.0", "this version"))
+    parser.add_argument("--cases", nargs="+", default=[*MESHES, "100000", "350000"])
+    parser.add_argument("--methods", nargs="+", default=["certified", "vsem"])
+    parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
+    parser.add_argument("--repeat", type=int, default=1)
+    parser.add_argument(
+        "--meshes", type=Path,
+        default=Path(os.environ.get("STRETCHMAP_MESHES", HERE.parent.parent / "shared" / "meshes"))
+        / "tets",
+    )  # fmt: skip
+    parser.add_argument("--json", type=Path, help="where the rows go")
+    parser.add_argument("--draw", type=Path, help="rows to draw the table of, instead of measuring")
+    parser.add_argument("--write", action="store_true", help="put the table on docs/speed.md")
+    parser.add_argument("--worker", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.worker:
+        print(json.dumps(worker(json.loads(options.worker))))
+        return 0
+    if options.draw is None and options.before is None:
+        parser.error("--before or --draw is needed")
+    data = json.loads(options.draw.read_text()) if options.draw else measure(options)
+    print(table(data))
+    if options.write:
+        write("speed", table(data))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
