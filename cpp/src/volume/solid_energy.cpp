@@ -136,15 +136,14 @@ void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Inde
 void SolidEnergy::model(const PointsRef& x, const EnergyWeights& w, Points& gradient,
                         linalg::BlockMatrix* hessian) const {
   gradient.setZero(rows(), 3);
-  double* blocks = nullptr;
-  if (hessian) {
-    hessian->values.setZero();
-    blocks = hessian->values.data();
-  }
+  double* blocks = hessian ? hessian->values.data() : nullptr;
   const Index parts = static_cast<Index>(part_tets_.size());
 #pragma omp parallel for schedule(static, 1)
   for (Index p = 0; p < parts; ++p) {
     const std::vector<Index>& list = part_tets_[p];
+    if (blocks)
+      std::fill(blocks + 9 * static_cast<std::ptrdiff_t>(row_ptr_[part_row_[p]]),
+                blocks + 9 * static_cast<std::ptrdiff_t>(row_ptr_[part_row_[p + 1]]), 0.0);
     for_batches(
         x, w, 0, static_cast<Index>(list.size()), blocks ? element_models : element_gradients,
         [&](Index position) { return list[position]; },

@@ -68,6 +68,10 @@ class SolidModel:
         shares: NDArray[np.float64] = volumes / volumes.sum()
         return shares
 
+    def _mean(self, values: NDArray[np.float64]) -> float:
+        """Of all tets by volume; a product of BLAS would depend on its number of threads."""
+        return float((self.shares * values).sum())
+
     @cached_property
     def weights(self) -> NDArray[np.float64]:
         """Of the tets in the energy, summing to 1: (k,).
@@ -94,7 +98,7 @@ class SolidModel:
         if self.scale is None:
             return np.ones(len(self.T))
         volumes = np.exp(3.0 * self.scale[self.T].mean(axis=1))
-        local: NDArray[np.float64] = volumes / float(self.shares @ volumes)
+        local: NDArray[np.float64] = volumes / self._mean(volumes)
         return local
 
     @cached_property
@@ -126,7 +130,7 @@ class SolidModel:
         """
         log = np.log(self.local_volumes)
         targets = np.exp(np.sign(log) * np.maximum(np.abs(log) - math.log(_REACH), 0.0))
-        asked: NDArray[np.float64] = targets / float(self.shares @ targets)
+        asked: NDArray[np.float64] = targets / self._mean(targets)
         return asked
 
     def gliding(
@@ -156,7 +160,7 @@ class SolidModel:
         assert self.ground is not None
         yielding = self.shares / self.weights
         missing = self.ground.volume - enclosed
-        asked = enclosed + missing * yielding / float(self.shares @ yielding)
+        asked = enclosed + missing * yielding / self._mean(yielding)
         return np.asarray(np.maximum(asked, 0.5 * enclosed))
 
     def kept(self, x: NDArray[np.float64]) -> bool:
