@@ -20,7 +20,8 @@ import stretchmap as sm
 # Knobs of the optimization, each with its own default as the sound value.
 _MOST_STEPS = {"untangle_iter", "frozen_iter", "glide_iter", "target_iter", "shift_iter", "shared"}
 _MOST_STEPS |= {"max_cg", "patience"}
-_SHARES = {"floor", "frozen_tol", "glide_tol", "marginal_tol"}  # 0: as far as it goes
+# 0: as far as it goes
+_SHARES = {"floor", "frozen_tol", "glide_tol", "marginal_tol", "glide_std", "glide_distortion"}
 # Classes that are made by hand; others are results.
 CLASSES = {"FillOptions", "PointMap", "TetMesh", "Torus", "TriMesh", "VolumeOptions"}
 CLASSES |= {"Dask", "Processes", "Similarity"}

@@ -138,7 +138,7 @@ class GridOptimizer:
         """Whether all edge triples are positive."""
         strength, least = _LOOSE, len(self.H) * 32
         for done in range(rounds + 1):
-            self._prepare(strength, 1.0)
+            self._prepare(strength, 1.0, pull=0.0)
             start = self._newton.value(self.V, _corner(1.0))
             report(progress, "untangle", done, rounds, bad=start.flips)
             if start.flips == 0:
@@ -172,7 +172,7 @@ class GridOptimizer:
         """
         before = self.V
         for done in range(_REPAIRS):
-            self._prepare(_LOOSE * _LOOSER**done, 1.0)
+            self._prepare(_LOOSE * _LOOSER**done, 1.0, pull=0.0)
             min_det = self._min_det()
             if min_det > 0.0:
                 return True
@@ -187,16 +187,22 @@ class GridOptimizer:
         epsilon = float(np.clip(-0.5 * min_det, _LEAST_EPSILON, _LARGEST_EPSILON))
         self.V, _ = self._newton.run(self.V, _corner(epsilon), 1.0, _STEPS)
 
-    def _prepare(self, strength: float, norm: float, guard: bool = True) -> None:
-        """Boxes and samples of the boundary for the present points."""
+    def _prepare(
+        self, strength: float, norm: float, *, guard: bool = True, pull: float = _PULL
+    ) -> None:
+        """Boxes and samples of the boundary for the present points.
+
+        While hexahedra are inverted, boxes drawn to the mean size would inflate those round them,
+        and every round would fold more.
+        """
         if guard:
             self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
-        self._newton.set_rest(self._sides(_MEAN), self._weights, self._guarded)
+        self._newton.set_rest(self._sides(_MEAN, pull), self._weights, self._guarded)
         samples = self._fit.match(self.V)
         factor = strength * self._strength * samples.share
         self._newton.set_fit(samples, factor, self._tolerance, norm)
 
-    def _sides(self, mean: float) -> NDArray[np.float64]:
+    def _sides(self, mean: float, pull: float) -> NDArray[np.float64]:
         """(k, 24) sides of the corners' boxes: their own edges, drawn to local means, and hexahedra
         to the mean size."""
         own = _core.resample.corner_sides(self.V, self.H)
@@ -204,8 +210,8 @@ class GridOptimizer:
         if mean > 0.0:
             means = self._mean_sides()
             logs += mean * (means[:, DIRECTIONS.ravel()] - logs)
-            pull = _PULL * (self._log_size - means.mean(axis=1))
-            logs += np.clip(pull, -_MOST_PULL, _MOST_PULL)[:, None]
+            drawn = pull * (self._log_size - means.mean(axis=1))
+            logs += np.clip(drawn, -_MOST_PULL, _MOST_PULL)[:, None]
         return np.ascontiguousarray(np.exp(logs))
 
     def _mean_sides(self) -> NDArray[np.float64]:

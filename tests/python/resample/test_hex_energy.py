@@ -10,6 +10,7 @@ import stretchmap as sm
 from stretchmap import _core, samples
 from stretchmap.errors import SolverError
 from stretchmap.resample.layout import swept_layout
+from stretchmap.resample.optimize import GridOptimizer
 from stretchmap.resample.quality import boundary_quads
 
 TORUS = sm.Torus(3.0, 1.0)
@@ -148,3 +149,21 @@ def test_edge_triples_bound_the_coefficients_between_corners():
             caught += 1
             assert least <= 0.0
     assert caught > 50
+
+
+def test_boxes_are_drawn_to_the_mean_size_only_once_corners_are_positive(monkeypatch):
+    """Drawn earlier, those round inverted hexahedra grow, and every round folds more."""
+    H, V = a_grid(0.4)
+    grid = GridOptimizer(V, H, samples.torus_surface(16, 12, R=3.0, r=1.0))
+    pulls = []
+    sides = grid._sides
+
+    def noted(mean, pull):
+        pulls.append(pull)
+        return sides(mean, pull)
+
+    monkeypatch.setattr(grid, "_sides", noted)
+    assert grid._untangle(40, None)
+    assert len(pulls) > 1 and set(pulls) == {0.0}
+    grid._round(1.0, 1.0)
+    assert pulls[-1] > 0.0

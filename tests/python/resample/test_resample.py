@@ -17,6 +17,9 @@ from stretchmap.resample.hexes import hex_mesh
 RNG = np.random.default_rng(2)
 
 
+NUMBERS = {"sections": 60, "block": 2, "rings": 2}
+
+
 @pytest.fixture(scope="module")
 def standard():
     solid = samples.solid_torus(40_000, R=3.0, r=1.0)
@@ -58,7 +61,7 @@ def test_the_grid_of_the_standard_torus_is_the_standard_grid(standard):
 
 @pytest.fixture(scope="module")
 def vertebra_grid(vertebra_map):
-    return hex_mesh(vertebra_map, n_hexahedra=1200)
+    return hex_mesh(vertebra_map, **NUMBERS)
 
 
 def test_an_optimized_grid_is_valid_of_good_shape_and_fills_the_solid(bumpy_map):
@@ -79,7 +82,7 @@ def test_an_optimized_grid_is_valid_of_good_shape_and_fills_the_solid(bumpy_map)
 
 def test_a_tangled_grid_is_made_valid(vertebra_map, vertebra_grid):
     """Sections through a sharply bent image leave hexahedra turned over."""
-    raw = hex_mesh(vertebra_map, n_hexahedra=1200, optimize=False)
+    raw = hex_mesh(vertebra_map, **NUMBERS, optimize=False)
     mesh = vertebra_grid
     assert raw.n_invalid == raw.n_pulled_back_invalid == mesh.n_pulled_back_invalid > 0
     assert mesh.n_invalid == 0
