@@ -33,7 +33,8 @@ void bind(py::module_& m) {
            py::arg("normals").noconvert(), py::arg("sample_faces").noconvert(),
            py::arg("sample_weights").noconvert(), py::arg("quads").noconvert(), py::arg("per_side"),
            py::arg("far"), release_gil())
-      .def("match", &BoundaryFit::match, py::arg("x").noconvert(), release_gil());
+      .def("match", &BoundaryFit::match, py::arg("x").noconvert(), py::arg("inward") = 0.0,
+           release_gil());
 
   py::class_<HexReport>(m, "HexReport")
       .def_readonly("energy", &HexReport::energy)

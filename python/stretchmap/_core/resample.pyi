@@ -17,7 +17,7 @@ class FitSamples:
 class BoundaryFit:
     def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], normals: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], sample_faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], sample_weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], quads: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], per_side: typing.SupportsInt | typing.SupportsIndex, far: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
-    def match(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> FitSamples:
+    def match(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], inward: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> FitSamples:
         ...
 class HexReport:
     @property

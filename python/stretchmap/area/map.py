@@ -154,15 +154,19 @@ def area_map(
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
     reference = _core.area.SurfaceReference(surface.V, surface.F, _MAX_ASPECT)
     turns, history = minimize_stretch(surface, chart, conformal, sem_iter, progress)
+    wanted = ratio if torus is None else torus.ratio
+    found = search_phase(surface, turns, conformal.aspect, phase, wanted)
     if sem_iter and history[-1].energy > 1.0 + JAMMED:
-        turns, records = balance_areas(
+        balanced, records = balance_areas(
             chart, reference, conformal.aspect, unfolded_turns(surface, chart, conformal), progress
         )
-        history += records
+        other = search_phase(surface, balanced, conformal.aspect, phase, wanted)
+        # Where only few places are jammed, areas come at the price of all shapes.
+        if other[-1] < found[-1]:
+            turns, found = balanced, other
+            history += records
     clock = _lap(seconds, "sem", clock)
-
-    wanted = ratio if torus is None else torus.ratio
-    phase, ratio = search_phase(surface, turns, conformal.aspect, phase, wanted)
+    phase, ratio, _ = found
     angles = start_angles(chart, turns, phase, ratio)
     clock = _lap(seconds, "phase", clock)
 

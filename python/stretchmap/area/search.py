@@ -30,8 +30,8 @@ def search_phase(
     aspect: float,
     phase: float | None,
     ratio: Ratio | float,
-) -> tuple[float, float]:
-    """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image."""
+) -> tuple[float, float, float]:
+    """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image, and it."""
     sample = surface.F[:: -(-len(surface.F) // _SAMPLE)]
     used, inverse = np.unique(sample, return_inverse=True)
     faces = inverse.reshape(sample.shape).astype(np.int32)
@@ -53,8 +53,8 @@ def search_phase(
     for k in starts:
         row, energy = rows[k * len(phases) + int(energies[k].argmin())], float(energies[k].min())
         found.append(_refined(reference, faces, turns, row, energy, width))
-    best = min(found, key=lambda pair: pair[1])[0]
-    return float(best[0] if phase is not None else best[0] % 1.0), float(best[1])
+    best, energy = min(found, key=lambda pair: pair[1])
+    return float(best[0] if phase is not None else best[0] % 1.0), float(best[1]), energy
 
 
 def _refined(

@@ -39,6 +39,8 @@ _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much
 _LOOSE = 0.5  # share of it while corners are not positive
 _TOLERANCE = 0.005  # of the diagonal: larger gaps count more ...
 _NORM = 2.0  # ... with the power 2 _NORM
+_OFFSET = 0.5  # share by which the error of the volume is made good from round to round ...
+_MOST_OFFSET = 1.0  # ... by a surface moved in or out by this many tolerances at most
 _LOOSER = 0.6  # factor of the fit where it is in the way
 _HARDER = 2.0  # factor of the weight of a hexahedron each time it is found invalid
 _REPAIRS = 10
@@ -99,6 +101,7 @@ class GridOptimizer:
             *_sites(surface, _PER_SIDE**2 * len(quads)), quads, _PER_SIDE, _FAR * self._tolerance,
         )  # fmt: skip
         self._strength = _FIT * len(quads) / surface.area
+        self._area, self._volume, self._inward = surface.area, surface.volume, 0.0
         self._log_size = np.log(_core.resample.hex_volumes(V, H).sum() / len(H)) / 3.0
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
@@ -152,6 +155,10 @@ class GridOptimizer:
         return False
 
     def _round(self, power: float, fit: float) -> None:
+        # The longest gaps are where tips are not reached, and closing them inflates the rest.
+        excess = float(_core.resample.hex_volumes(self.V, self.H).sum()) - self._volume
+        most = _MOST_OFFSET * self._tolerance
+        self._inward = float(np.clip(self._inward + _OFFSET * excess / self._area, -most, most))
         # What the shape gains in weight, the fit gains, too.
         self._descend(power, fit * np.sqrt(power), _NORM)
 
@@ -198,7 +205,7 @@ class GridOptimizer:
         if guard:
             self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
         self._newton.set_rest(self._sides(_MEAN, pull), self._weights, self._guarded)
-        samples = self._fit.match(self.V)
+        samples = self._fit.match(self.V, self._inward)
         factor = strength * self._strength * samples.share
         self._newton.set_fit(samples, factor, self._tolerance, norm)
 

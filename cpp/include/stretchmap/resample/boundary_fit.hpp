@@ -41,8 +41,9 @@ class BoundaryFit {
               const TetsRef& quads, int per_side, double far);
 
   // \param x points of the grid.
+  // \param inward how far inside the surface the grid's boundary is to lie.
   // \return their samples.
-  FitSamples match(const PointsRef& x) const;
+  FitSamples match(const PointsRef& x, double inward) const;
 
  private:
   Eigen::RowVector3d normal(Index face, const Eigen::Vector3d& weights) const;
