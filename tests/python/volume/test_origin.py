@@ -44,19 +44,33 @@ def skewed(n_tets):
     return sm.TetMesh(size * bent, solid.T)
 
 
-def test_another_mesh_of_the_same_body_begins_at_the_same_place():
+def test_other_meshes_of_the_same_body_begin_at_the_same_place():
     solid = skewed(2000)
     points = solid.V[solid.T].mean(axis=1)
-    one, other = (sm.volume_map(body) for body in (solid, skewed(4000)))
-    begin = [sm.origin_of(found) for found in (one, other)]
-    assert min(b.sureness[2] for b in begin) > 0.02
-    given = [found.coordinates(points) for found in (one, other)]
-    known = np.isfinite(given[0] + given[1]).all(axis=1)
-    assert known.mean() > 0.98
-    here, there = (b.coordinates(g[known])[:, :2] for b, g in zip(begin, given, strict=True))
-    moved = np.degrees(np.abs(np.angle(np.exp(1j * (here - there)).mean(axis=0))))
-    assert (moved < [1.5, 7.0]).all()
-    assert (apart(here, there) < [4.0, 11.0]).all()
+
+    def seen(found):
+        begin = sm.origin_of(found)
+        assert begin.sureness[2] > 0.02
+        given = found.coordinates(points)
+        inside = np.isfinite(given).all(axis=1)
+        assert inside.mean() > 0.99
+        angles = np.full((len(points), 2), np.nan)
+        angles[inside] = begin.coordinates(given[inside])[:, :2]
+        return angles
+
+    here = seen(sm.volume_map(solid))
+    moved, differ = [], []
+    for n_tets in (3000, 4000, 6000):
+        there = seen(sm.volume_map(skewed(n_tets)))
+        known = np.isfinite(here + there).all(axis=1)
+        assert known.mean() > 0.98
+        turn = np.exp(1j * (here - there)[known]).mean(axis=0)
+        moved.append(np.degrees(np.abs(np.angle(turn))))
+        differ.append(apart(here[known], there[known]))
+    # The maps themselves differ; the origin does not move farther than their points.
+    assert (np.array(moved) < np.array(differ)).all()
+    assert (np.median(moved, axis=0) < [1.5, 3.0]).all()
+    assert (np.median(differ, axis=0) < [4.0, 10.0]).all()
 
 
 def test_the_origin_does_not_depend_on_where_the_map_began(found):
