@@ -11,7 +11,6 @@ to its first step counts with it.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -20,7 +19,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from speed import write
+from speed import parser_of, write
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = HERE.parent / "python"
@@ -113,13 +112,9 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure or draw."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("cases", nargs="*", default=["100000"])
     parser.add_argument("--method", choices=list(METHODS), default="certified")
-    parser.add_argument("--json", type=Path, help="where the rows go")
-    parser.add_argument("--draw", type=Path, help="rows to draw the table of")
-    parser.add_argument("--write", action="store_true", help="put the table on docs/speed.md")
-    parser.add_argument("--worker", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.worker:
         print(json.dumps(worker(options.worker, options.method)))

@@ -156,9 +156,19 @@ def write(name: str, text: str) -> None:
     PAGE.write_text(head + begin + "\n\n" + text + "\n\n" + end + rest.split(end)[1])
 
 
+def parser_of(text: str | None) -> argparse.ArgumentParser:
+    """With what all benchmarks with a table on the page take."""
+    parser = argparse.ArgumentParser(description=(text or "").splitlines()[0])
+    parser.add_argument("--json", type=Path, help="where the rows go")
+    parser.add_argument("--draw", type=Path, help="rows to draw the table of, instead of measuring")
+    parser.add_argument("--write", action="store_true", help="put the table on docs/speed.md")
+    parser.add_argument("--worker", help=argparse.SUPPRESS)
+    return parser
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Measure or draw."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("--before", type=Path, help="folder of the package to compare with")
     parser.add_argument("--after", type=Path, default=HERE.parent / "python")
     parser.add_argument("--labels", nargs=2, default=("0.1.0", "this version"))
@@ -171,10 +181,6 @@ def main(arguments: list[str] | None = None) -> int:
         default=Path(os.environ.get("STRETCHMAP_MESHES", HERE.parent.parent / "shared" / "meshes"))
         / "tets",
     )  # fmt: skip
-    parser.add_argument("--json", type=Path, help="where the rows go")
-    parser.add_argument("--draw", type=Path, help="rows to draw the table of, instead of measuring")
-    parser.add_argument("--write", action="store_true", help="put the table on docs/speed.md")
-    parser.add_argument("--worker", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.worker:
         print(json.dumps(worker(json.loads(options.worker))))
