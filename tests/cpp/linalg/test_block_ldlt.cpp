@@ -16,8 +16,8 @@ namespace {
 using namespace stretchmap;
 
 // Full blocks on the pattern of a torus; the last unknown of each block a multiplier or not.
-SparseMatrix block_system(int block, bool quasi_definite) {
-  const Faces faces = tests::wavy_torus(9, 7).topology.faces;
+SparseMatrix block_system(int block, bool quasi_definite, int rings = 9, int sections = 7) {
+  const Faces faces = tests::wavy_torus(rings, sections).topology.faces;
   const int size = 3 * block;
   std::mt19937 engine(6);
   std::normal_distribution<double> normal;
@@ -62,6 +62,17 @@ TEST_CASE("blocks of two and three unknowns, definite and quasi-definite, are so
     check_against_lu<2>(quasi_definite);
     check_against_lu<3>(quasi_definite);
   }
+}
+
+TEST_CASE("the residual is small where separators and borders are many") {
+  const SparseMatrix matrix = block_system(3, true, 90, 47);
+  const Points normal = tests::random_points(static_cast<Index>(matrix.rows()), 4);
+  linalg::BlockLdlt<3> factor(matrix);
+  factor.factorize(matrix);
+  const Vec right = normal.col(1), solution = factor.solve(right);
+  CHECK((matrix * solution - right).norm() < 1e-9 * right.norm());
+  factor.factorize(2.0 * matrix);
+  CHECK((2.0 * factor.solve(right) - solution).norm() < 1e-12 * solution.norm());
 }
 
 TEST_CASE("a singular pivot is an error") {

@@ -3,6 +3,8 @@
 // quasi-definite ([H J'; J -C] with H and C positive definite, the unknowns in any order).
 #pragma once
 
+#include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "stretchmap/base/types.hpp"
@@ -25,18 +27,29 @@ class BlockLdlt {
   Vec solve(const VecRef& right) const;
 
  private:
-  using Block = Eigen::Matrix<double, K, K>;
-  using Part = Eigen::Matrix<double, K, 1>;
+  // A separator of the nested dissection, or a piece too small to be divided, and what it leaves.
+  struct Front {
+    Index first = 0, last = 0;    // its block rows, by their places in the elimination order
+    std::vector<Index> children;  // fronts eliminated before
+    std::vector<Index> border;    // later places its elimination fills, ascending
+    std::size_t start = 0;        // of its panel in values_: L below the diagonal and D on it
 
-  Index n_ = 0;                 // block rows
-  std::vector<Index> place_;    // old block row -> its place in the elimination order
-  std::vector<Index> order_;    // the inverse
-  std::vector<Index> parent_;   // elimination tree
-  std::vector<Index> start_;    // (n + 1) columns of L
-  std::vector<Index> row_;      // row of each block of L, ascending in a column
-  std::vector<Block> lower_;    // blocks of L below the diagonal
-  std::vector<Block> unit_;     // the diagonal blocks of L
-  std::vector<Part> diagonal_;  // D
+    Index own() const { return last - first; }
+    Index size() const { return own() + static_cast<Index>(border.size()); }
+  };
+  using Leftover = std::vector<double>;  // what an eliminated front subtracts from later ones
+
+  void find_borders(const SparseMatrix& A);
+  void group_fronts();
+  void eliminate(const SparseMatrix& A, Index front, std::vector<Leftover>& leftovers);
+
+  Index n_ = 0;                                 // block rows
+  std::vector<Index> place_;                    // block row -> its place in the elimination order
+  std::vector<Index> order_;                    // the inverse
+  std::vector<Front> fronts_;                   // children before their parents
+  std::vector<std::pair<Index, Index>> trees_;  // ranges of fronts that are subtrees of their own
+  std::vector<Index> top_;                      // fronts in none of them, ascending
+  std::vector<double> values_;
 };
 
 }  // namespace stretchmap::linalg

@@ -1,14 +1,17 @@
 #include "stretchmap/linalg/block_ldlt.hpp"
 
-#include <Eigen/OrderingMethods>
 #include <algorithm>
+#include <exception>
 
-#include "linalg/direct/block_update.hpp"
+#include "linalg/direct/dense_front.hpp"
+#include "linalg/direct/nested_dissection.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap::linalg {
 
 namespace {
+
+constexpr Index kTrees = 32;  // subtrees at least that threads work on, if there are so many
 
 // Block columns of block row i, in the matrix's own numbering.
 template <int K>
@@ -23,164 +26,185 @@ struct BlockRow {
 };
 
 template <int K>
-std::vector<Index> minimum_degree(const SparseMatrix& A, Index n) {
-  using Columns = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
-  Columns graph(n, n);
-  std::vector<Eigen::Triplet<double, Index>> entries;
+Dissection dissect_blocks(const SparseMatrix& A, Index n) {
+  std::vector<Index> start{0}, col;
   for (Index i = 0; i < n; ++i) {
     const BlockRow<K> row(A, i);
-    for (Index e = 0; e < row.size; ++e) entries.emplace_back(row.column(e), i, 1.0);
+    for (Index e = 0; e < row.size; ++e) col.push_back(row.column(e));
+    start.push_back(static_cast<Index>(col.size()));
   }
-  graph.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, Index> order;
-  Eigen::AMDOrdering<Index>()(graph, order);
-  return {order.indices().data(), order.indices().data() + n};
-}
-
-// pivot = unit * diagonal * unit'. Entry by entry: the unknowns of a block may be scaled badly
-// against each other, and an inverse would mix them up.
-template <int K>
-void factorize_pivot(Eigen::Matrix<double, K, K> pivot, Eigen::Matrix<double, K, K>& unit,
-                     Eigen::Matrix<double, K, 1>& diagonal) {
-  unit.setIdentity();
-  for (int j = 0; j < K; ++j) {
-    diagonal(j) = pivot(j, j);
-    for (int i = j + 1; i < K; ++i) {
-      unit(i, j) = pivot(i, j) / pivot(j, j);
-      for (int c = j + 1; c <= i; ++c) pivot(i, c) -= unit(i, j) * pivot(c, j);
-    }
-  }
+  return dissect(n, start.data(), col.data());
 }
 
 }  // namespace
 
 template <int K>
-BlockLdlt<K>::BlockLdlt(const SparseMatrix& A)
-    : n_(static_cast<Index>(A.rows()) / K), order_(minimum_degree<K>(A, n_)) {
+BlockLdlt<K>::BlockLdlt(const SparseMatrix& A) : n_(static_cast<Index>(A.rows()) / K) {
+  Dissection found = dissect_blocks<K>(A, n_);
+  order_ = std::move(found.order);
   place_.resize(order_.size());
   for (Index k = 0; k < n_; ++k) place_[order_[k]] = k;
-  parent_.assign(order_.size(), -1);
-  std::vector<Index> count(order_.size(), 0), mark(order_.size(), -1);
-  for (Index k = 0; k < n_; ++k) {
-    mark[k] = k;
-    const BlockRow<K> row(A, order_[k]);
-    for (Index e = 0; e < row.size; ++e)
-      for (Index i = place_[row.column(e)]; i < k && mark[i] != k; i = parent_[i]) {
-        if (parent_[i] == -1) parent_[i] = k;
-        ++count[i];
-        mark[i] = k;
-      }
+  for (Dissection::Node& node : found.nodes) {
+    fronts_.emplace_back();
+    fronts_.back().first = node.first;
+    fronts_.back().last = node.last;
+    fronts_.back().children = std::move(node.children);
   }
-  start_.assign(order_.size() + 1, 0);
-  for (Index k = 0; k < n_; ++k) start_[k + 1] = start_[k] + count[k];
-  row_.resize(start_[n_]);
-  lower_.resize(start_[n_]);
-  unit_.resize(order_.size());
-  diagonal_.resize(order_.size());
+  find_borders(A);
+  group_fronts();
 }
 
-namespace {
-
-// A block of the row being worked on, its columns padded.
 template <int K>
-auto columns(double* from) {
-  return Eigen::Map<Eigen::Matrix<double, kWorkBlock<K> / K, K>>(from);
-}
-
-// The block, which is zero afterwards.
-template <int K>
-Eigen::Matrix<double, K, K> take_block(double* from) {
-  const Eigen::Matrix<double, K, K> block = columns<K>(from).template topRows<K>();
-  std::fill_n(from, kWorkBlock<K>, 0.0);
-  return block;
-}
-
-// The elimination tree's paths from the entries of a row to its diagonal: what fills in.
-class RowPattern {
- public:
-  explicit RowPattern(std::size_t n) : mark_(n, -1), path_(n), pattern_(n), end_(n) {}
-
-  void begin(Index k) {
-    mark_[k] = k;
-    top_ = end_;
-  }
-  void add(Index i, Index k, const std::vector<Index>& parent) {
-    std::size_t length = 0;
-    for (; mark_[i] != k; i = parent[i]) {
-      path_[length++] = i;
-      mark_[i] = k;
+void BlockLdlt<K>::find_borders(const SparseMatrix& A) {
+  std::size_t total = 0;
+  for (Front& front : fronts_) {
+    std::vector<Index>& border = front.border;
+    for (Index k = front.first; k < front.last; ++k) {
+      const BlockRow<K> row(A, order_[k]);
+      for (Index e = 0; e < row.size; ++e) border.push_back(place_[row.column(e)]);
     }
-    while (length > 0) pattern_[--top_] = path_[--length];
+    for (const Index child : front.children)
+      border.insert(border.end(), fronts_[child].border.begin(), fronts_[child].border.end());
+    border.erase(std::remove_if(border.begin(), border.end(),
+                                [&](Index place) { return place < front.last; }),
+                 border.end());
+    std::sort(border.begin(), border.end());
+    border.erase(std::unique(border.begin(), border.end()), border.end());
+    border.shrink_to_fit();
+    front.start = total;
+    total += static_cast<std::size_t>(K * K) * front.size() * front.own();
   }
-  // The next column to be eliminated, -1 after the last.
-  Index next() { return top_ < end_ ? pattern_[top_++] : -1; }
+  values_.resize(total);
+}
 
- private:
-  std::vector<Index> mark_, path_, pattern_;
-  std::size_t end_, top_ = 0;
-};
-
-}  // namespace
-
-// Row by row: each row of L solves a triangular system whose pattern is read off the tree.
+// Subtrees of moderate size, each for one thread; the few large fronts above them are for all.
 template <int K>
-void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
-  std::vector<Index> filled(start_.begin(), start_.end() - 1);
-  RowPattern pattern(order_.size());
-  constexpr int kSize = kWorkBlock<K>, kColumn = kSize / K;
-  std::vector<double> work(kSize * order_.size(), 0.0);
-  const auto at = [&](Index i) { return work.data() + kSize * static_cast<std::size_t>(i); };
-  for (Index k = 0; k < n_; ++k) {
-    if (poll && k % 256 == 0) poll();
-    pattern.begin(k);
+void BlockLdlt<K>::group_fronts() {
+  std::vector<Index> least(fronts_.size());  // first front of the subtree
+  for (Index f = 0; f < static_cast<Index>(fronts_.size()); ++f) {
+    least[f] = f;
+    for (const Index child : fronts_[f].children) least[f] = std::min(least[f], least[child]);
+  }
+  std::vector<Index> open{static_cast<Index>(fronts_.size()) - 1};
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    const Index f = open[i];
+    if ((f - least[f] + 1) * kTrees <= static_cast<Index>(fronts_.size())) {
+      trees_.emplace_back(least[f], f + 1);
+    } else {
+      top_.push_back(f);
+      open.insert(open.end(), fronts_[f].children.begin(), fronts_[f].children.end());
+    }
+  }
+  std::sort(top_.begin(), top_.end());
+}
+
+template <int K>
+void BlockLdlt<K>::eliminate(const SparseMatrix& A, Index f, std::vector<Leftover>& leftovers) {
+  const Front& front = fronts_[f];
+  const Index own = front.own(), size = front.size(), rest = size - own;
+  const std::ptrdiff_t rows = K * size, lower = K * rest;
+  double* panel = values_.data() + front.start;
+  std::fill_n(panel, rows * K * own, 0.0);
+  Leftover& leftover = leftovers[f];
+  leftover.assign(static_cast<std::size_t>(lower) * lower, 0.0);
+  const auto row_of = [&](Index place) {
+    return place < front.last
+               ? place - front.first
+               : own + static_cast<Index>(
+                           std::lower_bound(front.border.begin(), front.border.end(), place) -
+                           front.border.begin());
+  };
+  // Where block (i, j) of the front is, j <= i, and the distance of its columns.
+  const auto at = [&](Index i, Index j) {
+    return j < own ? std::pair(panel + K * j * rows + K * i, rows)
+                   : std::pair(leftover.data() + K * (j - own) * lower + K * (i - own), lower);
+  };
+  for (Index k = front.first; k < front.last; ++k) {
     const BlockRow<K> row(A, order_[k]);
-    const Index width = K * row.size;
     for (Index e = 0; e < row.size; ++e) {
-      const Index i = place_[row.column(e)];
-      if (i > k) continue;
+      const Index place = place_[row.column(e)];
+      if (place < k) continue;
+      const auto [to, stride] = at(row_of(place), k - front.first);
       for (int c = 0; c < K; ++c)
         for (int d = 0; d < K; ++d)
-          at(i)[kColumn * d + c] = A.valuePtr()[row.first + c * width + K * e + d];
-      pattern.add(i, k, parent_);
+          to[c * stride + d] = A.valuePtr()[row.first + (c * row.size + e) * K + d];
     }
-    Block pivot = take_block<K>(at(k));
-    for (Index i; (i = pattern.next()) >= 0;) {
-      Block y = take_block<K>(at(i));  // becomes row block (k, i) of L D
-      for (int c = 1; c < K; ++c)
-        for (int d = 0; d < c; ++d) y.col(c) -= unit_[i](c, d) * y.col(d);
-      if (const Index count = filled[i] - start_[i]; count > 0) {
-        double padded[kSize] = {};
-        columns<K>(padded).template topRows<K>() = y;
-        const auto subtract = K == 2 ? subtract_updates_2 : subtract_updates_3;
-        subtract(work.data(), padded, row_.data() + start_[i], lower_[start_[i]].data(), count);
+  }
+  for (const Index child : front.children) {
+    const std::vector<Index>& border = fronts_[child].border;
+    const Index count = static_cast<Index>(border.size());
+    std::vector<Index> to(border.size());
+    std::transform(border.begin(), border.end(), to.begin(), row_of);
+    const std::ptrdiff_t height = K * count;
+    for (Index j = 0; j < count; ++j)
+      for (int c = 0; c < K; ++c) {
+        const double* from = leftovers[child].data() + (K * j + c) * height;
+        const auto [column, stride] = at(to[j], to[j]);
+        for (Index i = j; i < count; ++i)
+          for (int d = 0; d < K; ++d)
+            column[c * stride + K * (to[i] - to[j]) + d] += from[K * i + d];
       }
-      const Block entry = y * diagonal_[i].cwiseInverse().asDiagonal();
-      pivot.noalias() -= entry * y.transpose();
-      row_[filled[i]] = k;
-      lower_[filled[i]++] = entry;
+    Leftover().swap(leftovers[child]);
+  }
+  const Index bad = eliminate_front(panel, leftover.data(), K * size, K * own);
+  if (bad >= 0)
+    throw Error("SolverError", "a pivot is zero or not finite", {order_[front.first + bad / K]});
+}
+
+template <int K>
+void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
+  std::vector<Leftover> leftovers(fronts_.size());
+  std::vector<std::exception_ptr> failed(trees_.size());
+  if (poll) poll();
+#pragma omp parallel for schedule(dynamic)
+  for (Index t = 0; t < static_cast<Index>(trees_.size()); ++t) {
+    try {
+      for (Index f = trees_[t].first; f < trees_[t].second; ++f) eliminate(A, f, leftovers);
+    } catch (...) {
+      failed[t] = std::current_exception();
     }
-    factorize_pivot<K>(pivot, unit_[k], diagonal_[k]);
-    if (!diagonal_[k].cwiseInverse().allFinite())
-      throw Error("SolverError", "a pivot is zero or not finite", {order_[k]});
+  }
+  for (const std::exception_ptr& error : failed)
+    if (error) std::rethrow_exception(error);
+  for (const Index f : top_) {
+    if (poll) poll();
+    eliminate(A, f, leftovers);
   }
 }
 
 template <int K>
 Vec BlockLdlt<K>::solve(const VecRef& right) const {
-  std::vector<Part> x(order_.size());
-  for (Index k = 0; k < n_; ++k) x[k] = right.template segment<K>(K * order_[k]);
-  for (Index k = 0; k < n_; ++k) {
-    unit_[k].template triangularView<Eigen::UnitLower>().solveInPlace(x[k]);
-    for (Index p = start_[k]; p < start_[k + 1]; ++p) x[row_[p]].noalias() -= lower_[p] * x[k];
+  Vec x(right.size());
+  for (Index k = 0; k < n_; ++k)
+    x.template segment<K>(K * k) = right.template segment<K>(K * order_[k]);
+  using Panel = Eigen::Map<const Eigen::MatrixXd>;
+  Vec far;
+  const auto gather = [&](const Front& front) {
+    for (Index i = 0; i < static_cast<Index>(front.border.size()); ++i)
+      far.template segment<K>(K * i) = x.template segment<K>(K * front.border[i]);
+  };
+  for (const Front& front : fronts_) {
+    const Panel panel(values_.data() + front.start, K * front.size(), K * front.own());
+    auto near = x.segment(K * front.first, K * front.own());
+    panel.topRows(near.size()).template triangularView<Eigen::UnitLower>().solveInPlace(near);
+    far.noalias() = panel.bottomRows(panel.rows() - near.size()) * near;
+    for (Index i = 0; i < static_cast<Index>(front.border.size()); ++i)
+      x.template segment<K>(K * front.border[i]) -= far.template segment<K>(K * i);
+    near.array() /= panel.diagonal().array();
   }
-  for (Index k = n_ - 1; k >= 0; --k) {
-    x[k].array() /= diagonal_[k].array();
-    for (Index p = start_[k]; p < start_[k + 1]; ++p)
-      x[k].noalias() -= lower_[p].transpose() * x[row_[p]];
-    unit_[k].transpose().template triangularView<Eigen::UnitUpper>().solveInPlace(x[k]);
+  for (auto front = fronts_.rbegin(); front != fronts_.rend(); ++front) {
+    const Panel panel(values_.data() + front->start, K * front->size(), K * front->own());
+    auto near = x.segment(K * front->first, K * front->own());
+    far.resize(panel.rows() - near.size());
+    gather(*front);
+    near.noalias() -= panel.bottomRows(far.size()).transpose() * far;
+    panel.topRows(near.size())
+        .transpose()
+        .template triangularView<Eigen::UnitUpper>()
+        .solveInPlace(near);
   }
   Vec solution(right.size());
-  for (Index k = 0; k < n_; ++k) solution.segment<K>(K * order_[k]) = x[k];
+  for (Index k = 0; k < n_; ++k) solution.segment<K>(K * order_[k]) = x.template segment<K>(K * k);
   return solution;
 }
 

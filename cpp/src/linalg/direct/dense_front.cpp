@@ -1,0 +1,119 @@
+#include "linalg/direct/dense_front.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "stretchmap/base/clones.hpp"
+
+namespace stretchmap::linalg {
+
+namespace {
+
+constexpr Index kTall = 8, kWide = 6;  // tile of the product that stays in registers
+constexpr Index kDeep = 256;           // columns of the factors taken at a time
+constexpr Index kRows = 16 * kTall;    // rows of a block that stays in the second-level cache
+constexpr Index kBlock = 32;           // columns of a panel eliminated one by one
+
+Index tiles(Index n, Index size) { return (n + size - 1) / size; }
+
+// tile[j][i] = sum over k of a[k][i] b[k][j]
+STRETCHMAP_CLONES void multiply_tile(const double* a, const double* b, Index depth, double* tile) {
+  double sum[kWide][kTall] = {};
+  for (Index k = 0; k < depth; ++k, a += kTall, b += kWide)
+    for (Index j = 0; j < kWide; ++j)
+      for (Index i = 0; i < kTall; ++i) sum[j][i] += a[i] * b[j];
+  for (Index j = 0; j < kWide; ++j)
+    for (Index i = 0; i < kTall; ++i) tile[kTall * j + i] = sum[j][i];
+}
+
+// The columns right of `c` up to `end`, and all rows from there on, less the outer product.
+STRETCHMAP_CLONES void eliminate_column(double* panel, std::ptrdiff_t rows, Index c, Index end) {
+  double* column = panel + c * rows;
+  const double pivot = column[c];
+  for (Index to = c + 1; to < end; ++to) {
+    const double factor = column[to] / pivot;
+    double* target = panel + to * rows;
+    for (std::ptrdiff_t r = to; r < rows; ++r) target[r] -= factor * column[r];
+  }
+  for (std::ptrdiff_t r = c + 1; r < rows; ++r) column[r] /= pivot;
+}
+
+// Rows [first, first + n) and columns [begin, end) of L, in strips of `size` rows, padded with
+// zeros; times D if given.
+void pack(const double* panel, std::ptrdiff_t rows, Index first, Index n, Index begin, Index end,
+          Index size, const double* diagonal, double* out) {
+  for (Index strip = 0; strip < n; strip += size) {
+    const Index filled = std::min(size, n - strip);
+    for (Index k = begin; k < end; ++k, out += size) {
+      const double* from = panel + k * rows + first + strip;
+      const double factor = diagonal ? diagonal[k] : 1.0;
+      for (Index i = 0; i < filled; ++i) out[i] = factor * from[i];
+      for (Index i = filled; i < size; ++i) out[i] = 0.0;
+    }
+  }
+}
+
+// The matrix an update is taken from; its entry (i, j) is at data[j * stride + i].
+struct Target {
+  double* data;
+  std::ptrdiff_t stride;
+  Index rows, columns;
+};
+
+// target -= L(rows from `first_row` on) D L(rows from `first_column` on)', columns [0, depth) of L;
+// of tiles on or below the diagonal alone.
+void update(const Target& target, const double* panel, std::ptrdiff_t rows, Index first_row,
+            Index first_column, Index depth, const double* diagonal) {
+  const Index strips = tiles(target.columns, kWide);
+  std::vector<double> right(static_cast<std::size_t>(strips) * kWide * std::min(depth, kDeep));
+  const Index blocks = tiles(target.rows, kRows);
+  for (Index begin = 0; begin < depth; begin += kDeep) {
+    const Index end = std::min(depth, begin + kDeep), deep = end - begin;
+    pack(panel, rows, first_column, target.columns, begin, end, kWide, diagonal, right.data());
+#pragma omp parallel for schedule(dynamic) if (blocks > 3)
+    for (Index block = 0; block < blocks; ++block) {
+      const Index top = block * kRows, height = std::min(kRows, target.rows - top);
+      thread_local std::vector<double> left;
+      left.resize(static_cast<std::size_t>(kRows) * kDeep);
+      pack(panel, rows, first_row + top, height, begin, end, kTall, nullptr, left.data());
+      for (Index s = 0; s < strips && s * kWide < top + height; ++s)
+        for (Index t = 0; t < height; t += kTall) {
+          const Index row = top + t, column = s * kWide;
+          if (row + kTall <= column) continue;
+          double tile[kTall * kWide];
+          multiply_tile(left.data() + static_cast<std::ptrdiff_t>(t) * deep,
+                        right.data() + static_cast<std::ptrdiff_t>(column) * deep, deep, tile);
+          const Index tall = std::min(kTall, target.rows - row);
+          const Index wide = std::min(kWide, target.columns - column);
+          for (Index j = 0; j < wide; ++j) {
+            double* to = target.data + (column + j) * target.stride + row;
+            for (Index i = 0; i < tall; ++i) to[i] -= tile[kTall * j + i];
+          }
+        }
+    }
+  }
+}
+
+}  // namespace
+
+Index eliminate_front(double* panel, double* schur, Index rows, Index own) {
+  std::vector<double> diagonal(static_cast<std::size_t>(own));
+  const std::ptrdiff_t stride = rows;
+  for (Index begin = 0; begin < own; begin += kBlock) {
+    const Index end = std::min(own, begin + kBlock);
+    update({panel + begin * stride + begin, stride, rows - begin, end - begin}, panel, stride,
+           begin, begin, begin, diagonal.data());
+    for (Index c = begin; c < end; ++c) {
+      diagonal[c] = panel[c * stride + c];
+      if (!std::isfinite(1.0 / diagonal[c])) return c;
+      eliminate_column(panel, stride, c, end);
+    }
+  }
+  update({schur, stride - own, rows - own, rows - own}, panel, stride, own, own, own,
+         diagonal.data());
+  return -1;
+}
+
+}  // namespace stretchmap::linalg
