@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 
 from ..area.map import area_map, finished
@@ -58,22 +59,31 @@ def boundary_starts(
         reason = f"{found.stop_reason}, a stretch of the surface undone"
         return dataclasses.replace(found, mesh=solid.surface, converged=False, stop_reason=reason)
 
+    def fatter() -> Iterator[AreaMap]:
+        # The torus whose areas fit best can be too thin for what is inside; one halfway, on the
+        # scale of log(R / r), to where its hole closes has cured that wherever it was met.
+        if options.ratio is not None:
+            return
+        found = area_map(
+            surface, ratio=math.sqrt(first.ratio), phase=options.phase, finish="none",
+            keep_best=True, progress=progress,
+        )  # fmt: skip
+        if not found.certificate.certified:
+            found = finished(found, max_iter=0, tol=_TOL, progress=progress)
+        yield of_the_solid(found)
+
     if not glide:
         yield steps(_STEPS)
         yield steps(0)
         return
-    if first.certificate.certified:
-        yield of_the_solid(first)
-        yield of_the_solid(steps(_STEPS))
-        return
     # Faces that look inward cost the interior more steps than unfolding them beforehand; but where
     # that gets stuck, it leaves needles that no gliding opens again.
-    unfolded = steps(0)
-    if unfolded.history[-1].flips:
-        yield of_the_solid(first)
+    unfolded = first if first.certificate.certified else steps(0)
+    begin = first if unfolded.history[-1].flips else unfolded
+    yield of_the_solid(begin)
+    yield from fatter()
+    if unfolded is not begin:
         yield of_the_solid(unfolded)
-        yield of_the_solid(steps(_STEPS))
-    else:
-        yield of_the_solid(unfolded)
-        yield of_the_solid(steps(_STEPS))
+    yield of_the_solid(steps(_STEPS))
+    if first is not begin:
         yield of_the_solid(first)

@@ -20,7 +20,7 @@ from .options import FillOptions
 __all__ = ["Budget", "History", "SolidModel", "face_areas"]
 
 FREE, FIXED, GLIDING = 0, 1, 2
-_LEAST_SECONDS, _MARGIN = 4.0, 0.9  # a stage under way is ended
+_LEAST_SECONDS, _MARGIN = 4.5, 0.9  # a stage under way is ended
 _THICK = 0.02  # share of the mean volume round its vertices that a sliver is given
 _REACH = 8.0  # factor up to which the volume next to a boundary face may be off what it expects
 

@@ -110,8 +110,17 @@ def test_the_first_start_has_no_folded_face_if_that_can_be_had(monkeypatch):
     found = dataclasses.replace(plain, certificate=folded)
     monkeypatch.setattr(boundary_starts_module, "area_map", lambda *_, **__: found)
     starts = list(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
-    assert [start.certificate.certified for start in starts] == [True, True, False]
-    assert starts[2] is found
+    assert [start.certificate.certified for start in starts] == [True, True, True, False]
+    assert starts[3] is found
+
+
+def test_the_second_start_has_a_fatter_torus_unless_its_ratio_is_given():
+    starts = boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None)
+    first, second = next(starts), next(starts)
+    assert second.torus.ratio == pytest.approx(np.sqrt(first.torus.ratio), rel=1e-9)
+    assert second.certificate.certified
+    given = boundary_starts(SOLID, VolumeOptions(ratio=3.0), glide=True, progress=None)
+    assert {start.torus.ratio for start in given} == {3.0}
 
 
 def test_folded_faces_are_better_than_inverted_tets(problem, monkeypatch):
