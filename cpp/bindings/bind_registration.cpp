@@ -33,6 +33,18 @@ void bind_match(py::module_& m) {
       py::arg("chart"), py::arg("y").noconvert(), py::arg("X").noconvert(),
       py::arg("slopes").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
       release_gil());
+  m.def("cover_value", &cover_value, py::arg("chart"), py::arg("y").noconvert(), py::arg("home"),
+        py::arg("metric").noconvert(), py::arg("rest").noconvert(), py::arg("weights").noconvert(),
+        release_gil());
+  m.def(
+      "cover_model",
+      [](const area::SurfaceChart& chart, const Points2Ref& y, const IndexVecRef& home,
+         const RowsRef& metric, const RowsRef& rest, const VecRef& weights) {
+        MatchModel model = cover_model(chart, y, home, metric, rest, weights);
+        return std::make_pair(std::move(model.gradient), std::move(model.hessian));
+      },
+      py::arg("chart"), py::arg("y").noconvert(), py::arg("home"), py::arg("metric").noconvert(),
+      py::arg("rest").noconvert(), py::arg("weights").noconvert(), release_gil());
   m.def("flat_value", &flat_value, py::arg("chart"), py::arg("y").noconvert(), py::arg("lattice"),
         py::arg("rest").noconvert(), py::arg("weights").noconvert(), release_gil());
   m.def(

@@ -10,9 +10,9 @@
 namespace stretchmap::registration {
 namespace {
 
-Eigen::Matrix2d rest_of(const RowsRef& rest, Index f) {
+Eigen::Matrix2d matrix_of(const RowsRef& rows, Index k) {
   Eigen::Matrix2d matrix;
-  matrix << rest(f, 0), rest(f, 1), rest(f, 2), rest(f, 3);
+  matrix << rows(k, 0), rows(k, 1), rows(k, 2), rows(k, 3);
   return matrix;
 }
 
@@ -39,26 +39,34 @@ FaceModel face_model(const Eigen::Matrix2d& P, const Eigen::Matrix2d& R,
   return {D.transpose() * flat, D.transpose() * curvature * D};
 }
 
-// Sum over the faces; model_of(f) is a face's share without its weight.
-template <typename ModelOfFace>
-MatchModel assemble(const area::SurfaceChart& chart, const VecRef& weights,
-                    const ModelOfFace& model_of) {
-  const Index n = chart.n_vertices, m = static_cast<Index>(chart.faces.rows());
+// Sum over weights; term k is about face_of(k), and model_of(k) its share without the weight.
+template <typename FaceOf, typename ModelOf>
+MatchModel assemble(const area::SurfaceChart& chart, const VecRef& weights, const FaceOf& face_of,
+                    const ModelOf& model_of) {
+  const Index n = chart.n_vertices, m = static_cast<Index>(weights.size());
   MatchModel model{Vec::Zero(2 * n), SparseMatrix(2 * n, 2 * n)};
   std::vector<Eigen::Triplet<double, Index>> entries;
   entries.reserve(36 * static_cast<std::size_t>(m));
-  for (Index f = 0; f < m; ++f) {
-    const FaceModel face = model_of(f);
+  for (Index k = 0; k < m; ++k) {
+    const FaceModel face = model_of(k);
+    const Index f = face_of(k);
     for (int p = 0; p < 6; ++p) {
       const Index row = 2 * chart.faces(f, p / 2) + p % 2;
-      model.gradient[row] += weights[f] * face.gradient[p];
+      model.gradient[row] += weights[k] * face.gradient[p];
       for (int q = 0; q < 6; ++q)
         entries.emplace_back(row, 2 * chart.faces(f, q / 2) + q % 2,
-                             weights[f] * face.hessian(p, q));
+                             weights[k] * face.hessian(p, q));
     }
   }
   model.hessian.setFromTriplets(entries.begin(), entries.end());
   return model;
+}
+
+template <typename ModelOfFace>
+MatchModel assemble(const area::SurfaceChart& chart, const VecRef& weights,
+                    const ModelOfFace& model_of) {
+  return assemble(
+      chart, weights, [](Index f) { return f; }, model_of);
 }
 
 }  // namespace
@@ -66,7 +74,7 @@ MatchModel assemble(const area::SurfaceChart& chart, const VecRef& weights,
 double face_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
                   const RowsRef& rest, Index f) {
   if (!(chart.edges(y, f).determinant() > 0.0)) return std::numeric_limits<double>::infinity();
-  return area::triangle_value(mesh::plane_edges(X, chart.faces, f) * rest_of(rest, f));
+  return area::triangle_value(mesh::plane_edges(X, chart.faces, f) * matrix_of(rest, f));
 }
 
 double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
@@ -83,7 +91,7 @@ double match_value(const area::SurfaceChart& chart, const Points2Ref& y, const P
 MatchModel match_model(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
                        const RowsRef& slopes, const RowsRef& rest, const VecRef& weights) {
   return assemble(chart, weights, [&](Index f) {
-    const Eigen::Matrix2d P = mesh::plane_edges(X, chart.faces, f), R = rest_of(rest, f);
+    const Eigen::Matrix2d P = mesh::plane_edges(X, chart.faces, f), R = matrix_of(rest, f);
     if (slopes.rows() == 0) {
       const Eigen::Matrix2d S = P * chart.edges(y, f).inverse();
       return face_model(P, R, [&](int) { return S; });
@@ -102,11 +110,32 @@ MatchModel match_model(const area::SurfaceChart& chart, const Points2Ref& y, con
   });
 }
 
+double cover_value(const area::SurfaceChart& chart, const Points2Ref& y, const IndexVecRef& home,
+                   const RowsRef& metric, const RowsRef& rest, const VecRef& weights) {
+  double total = 0.0;
+  for (Index j = 0; j < home.size(); ++j)
+    total += weights[j] * area::triangle_value(matrix_of(metric, j) * chart.edges(y, home[j]) *
+                                               matrix_of(rest, home[j]));
+  return total;
+}
+
+MatchModel cover_model(const area::SurfaceChart& chart, const Points2Ref& y,
+                       const IndexVecRef& home, const RowsRef& metric, const RowsRef& rest,
+                       const VecRef& weights) {
+  return assemble(
+      chart, weights, [&](Index j) { return home[j]; },
+      [&](Index j) {
+        const Eigen::Matrix2d Q = matrix_of(metric, j);
+        return face_model(Q * chart.edges(y, home[j]), matrix_of(rest, home[j]),
+                          [&](int) { return Q; });
+      });
+}
+
 double flat_value(const area::SurfaceChart& chart, const Points2Ref& y,
                   const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights) {
   double total = 0.0;
   for (Index f = 0; f < chart.faces.rows(); ++f)
-    total += weights[f] * area::triangle_value(lattice * chart.edges(y, f) * rest_of(rest, f));
+    total += weights[f] * area::triangle_value(lattice * chart.edges(y, f) * matrix_of(rest, f));
   return total;
 }
 
@@ -114,7 +143,7 @@ MatchModel flat_model(const area::SurfaceChart& chart, const Points2Ref& y,
                       const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights) {
   return assemble(chart, weights, [&](Index f) {
     const Eigen::Matrix2d P = lattice * chart.edges(y, f);
-    return face_model(P, rest_of(rest, f), [&](int) { return lattice; });
+    return face_model(P, matrix_of(rest, f), [&](int) { return lattice; });
   });
 }
 

@@ -4,12 +4,16 @@ import numpy.typing
 import scipy.sparse
 import stretchmap._core.area
 import typing
-__all__: list[str] = ['ChartLocator', 'flat_model', 'flat_value', 'match_model', 'match_value', 'relax_match']
+__all__: list[str] = ['ChartLocator', 'cover_model', 'cover_value', 'flat_model', 'flat_value', 'match_model', 'match_value', 'relax_match']
 class ChartLocator:
     def __init__(self, chart: stretchmap._core.area.SurfaceChart, turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> None:
         ...
     def locate(self, queries: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]]:
         ...
+def cover_model(chart: stretchmap._core.area.SurfaceChart, y: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], home: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], metric: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], rest: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], scipy.sparse.csr_matrix]:
+    ...
+def cover_value(chart: stretchmap._core.area.SurfaceChart, y: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], home: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], metric: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], rest: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> float:
+    ...
 def flat_model(chart: stretchmap._core.area.SurfaceChart, y: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], lattice: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], rest: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], scipy.sparse.csr_matrix]:
     ...
 def flat_value(chart: stretchmap._core.area.SurfaceChart, y: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], lattice: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], rest: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> float:

@@ -21,8 +21,8 @@ from .. import _core
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.split_edges import SplitSolid
 from .flat_torus import FlatSurface, wrapped
-from .match import SurfaceProblem
 from .overlay import overlay_splits
+from .surface_problem import SurfaceProblem
 
 _ROUNDS = 40
 _PATIENCE = 6  # rounds that do not lower the number of crossings

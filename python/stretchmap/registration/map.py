@@ -34,10 +34,11 @@ from ..mesh.split_edges import SplitSolid
 from ..volume.engine import require_certified, solve
 from ..volume.options import FillOptions
 from ..volume.problem import VolumeProblem
+from .affine import affine_landmark_map
 from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
-from .match import affine_landmark_map, match_surfaces
+from .match import match_surfaces
 from .quality import surface_distance
 
 __all__ = ["Registration", "register"]

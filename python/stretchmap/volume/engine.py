@@ -293,7 +293,7 @@ def _glided_on_mesh(run: _Run) -> Outcome:
     needless, done = history.model.kept(run.x), None
     if not needless:
         with run.timed("glide"):
-            done = glide_on_mesh(run.problem, o, history, start=weight)
+            done = glide_on_mesh(run.problem, o, history)
     glided = done is not None
     if done is None:
         run.take(run.problem)

@@ -28,11 +28,14 @@ _TRIES, _RELEASES = 4, 2
 _MOST_PAIRS = 10_000
 # What is amiss far apart is mended by moving all between, which a coarse solve hardly sees.
 _CG_TOL = 0.01
+# Weight of the volume term to begin with. Where volumes have far to go, shape leads the boundary
+# there; volumes alone drive it into the nearest jam.
+_START = 0.2
 _REACHES = (1, 2, 4)  # rings of vertices round inverted tets that may glide
 
 
 def glide_on_mesh(
-    problem: VolumeProblem, options: FillOptions, history: History, *, start: float
+    problem: VolumeProblem, options: FillOptions, history: History
 ) -> Minimized | None:
     """Least volume distortion with the boundary gliding on ``problem.ground``.
 
@@ -43,8 +46,6 @@ def glide_on_mesh(
     options : FillOptions
     history : History
         Gets a record per step, of the stage ``"glide"``.
-    start : float
-        Weight of the volume term to begin with.
 
     Returns
     -------
@@ -52,7 +53,7 @@ def glide_on_mesh(
         As certifiable as what was given; None if the boundary crosses itself, whatever is held.
     """
     options = dataclasses.replace(options, cg_tol=min(options.cg_tol, _CG_TOL))
-    x, first = problem.x, start
+    x, first = problem.x, min(options.frozen_weight, _START)
     held, found = _folded(problem, options, x), None
     tries = releases = 0
     while tries < _TRIES:

@@ -114,7 +114,7 @@ def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
     )
     monkeypatch.setattr(ground, "_RELEASES", 0)
     options = dataclasses.replace(FillOptions(), glide_iter=3)
-    done = ground.glide_on_mesh(problem, options, history, start=10.0)
+    done = ground.glide_on_mesh(problem, options, history)
     assert done is not None
     assert np.array_equal(done.x[some], problem.x[some])
     assert not np.array_equal(
@@ -122,7 +122,7 @@ def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
     )
     assert not len(true_crossing(problem, done.x))
     monkeypatch.setattr(ground, "_crossing", lambda p, x: some)
-    assert ground.glide_on_mesh(problem, options, history, start=10.0) is None
+    assert ground.glide_on_mesh(problem, options, history) is None
 
 
 def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps):

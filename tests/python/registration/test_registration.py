@@ -19,11 +19,11 @@ from stretchmap.maps.points import PointMap
 from stretchmap.mesh.meshes import TetMesh, TriMesh
 from stretchmap.mesh.split_edges import SplitSolid, split_edges
 from stretchmap.registration import embed as _embed
+from stretchmap.registration.affine import affine_landmark_map
 from stretchmap.registration.embed import embed_boundary, unfold_boundary
 from stretchmap.registration.flat_torus import FlatSurface, Gauge, choose_gauge
 from stretchmap.registration.landmarks import Landmarks, read_landmarks
 from stretchmap.registration.map import register
-from stretchmap.registration.match import affine_landmark_map
 from stretchmap.registration.overlay import overlay_splits
 from stretchmap.registration.suggest import landmarks_between
 
@@ -227,6 +227,36 @@ def test_surface_derivatives_match_finite_differences():
 
     difference = (energy(y + step * direction) - energy(y - step * direction)) / (2 * step)
     assert difference == pytest.approx(gradient @ direction.ravel(), rel=1e-5)
+
+
+def test_cover_derivatives_match_finite_differences():
+    surface = samples.torus_surface(24, 12)
+    flat = FlatSurface.of(surface)
+    rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0)
+    y = flat.turns + 1e-3 * RNG.standard_normal(flat.turns.shape)
+    home = RNG.integers(0, surface.n_faces, 700).astype(np.int32)
+    metric = np.tile(np.array([[9.0, 0.3, 0.0, 3.0]]), (len(home), 1))
+    weights = RNG.uniform(0.5, 1.0, len(home))
+    gradient, hessian = _core.registration.cover_model(flat.chart, y, home, metric, rest, weights)
+    assert np.abs(hessian - hessian.T).max() < 1e-12 * np.abs(hessian).max()
+    direction = RNG.standard_normal(y.shape)
+    difference = [
+        _core.registration.cover_value(
+            flat.chart, y + step * direction, home, metric, rest, weights
+        )
+        for step in (1e-7, -1e-7)
+    ]
+    slope = (difference[0] - difference[1]) / 2e-7
+    assert slope == pytest.approx(gradient @ direction.ravel(), rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", [5, 23])
+def test_processes_of_the_target_are_not_cut_off(seed):
+    """However far apart two shapes are: a face that spans a process stands for all of it."""
+    smooth = samples.solid_torus(3000)
+    spiky = samples.vertebra_like(3000, seed=seed)
+    result = register(smooth, spiky, boundary="frozen", keep_best=True)
+    assert result.surface_distance < 0.06
 
 
 def test_landmarks_by_rule(pair):

@@ -39,9 +39,25 @@ struct MatchModel {
 MatchModel match_model(const area::SurfaceChart& chart, const Points2Ref& y, const PointsRef& X,
                        const RowsRef& slopes, const RowsRef& rest, const VecRef& weights);
 
-// The same energy for the map into the plane, where the target is the flat torus itself: P_f is
-// lattice * E_f.
-// \param lattice the two periods as columns.
+// The energy as the target sees it. A triangle of the image that spans a process of the target is
+// small, however much of the target it stands for, so that Psi would have processes cut off. Here
+// each sample of the target, in face `home` of the source's image, weighs what the map does there,
+//
+//   Phi(y) = sum_j weight_j phi(Q_j E_f rest_f),  f = home_j,
+//
+// Q_j the target's face as it lies in the chart, E_f the edges of f there: no chord is taken.
+// \param metric (q, 4) row-major 2x2 matrices Q_j, of positive determinant.
+// \return +infinity if a home is folded.
+double cover_value(const area::SurfaceChart& chart, const Points2Ref& y, const IndexVecRef& home,
+                   const RowsRef& metric, const RowsRef& rest, const VecRef& weights);
+
+// Derivatives while samples stay in their homes. \pre cover_value is finite.
+MatchModel cover_model(const area::SurfaceChart& chart, const Points2Ref& y,
+                       const IndexVecRef& home, const RowsRef& metric, const RowsRef& rest,
+                       const VecRef& weights);
+
+// The same energy as Psi for the map into the plane, where the target is the flat torus itself: P_f
+// is lattice * E_f. \param lattice the two periods as columns.
 double flat_value(const area::SurfaceChart& chart, const Points2Ref& y,
                   const Eigen::Matrix2d& lattice, const RowsRef& rest, const VecRef& weights);
 
