@@ -3,6 +3,7 @@
 #include "arrays.hpp"
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/chart_newton.hpp"
+#include "stretchmap/area/coarsen.hpp"
 #include "stretchmap/area/surface_newton.hpp"
 #include "stretchmap/area/surface_quality.hpp"
 #include "stretchmap/area/surface_sem.hpp"
@@ -21,6 +22,16 @@ void bind_chart(py::module_& m) {
       .def_readonly("shift_v", &SurfaceChart::shift_v);
   m.def("turn_areas", &turn_areas, py::arg("chart"), py::arg("turns").noconvert(), release_gil());
   m.def("angle_from_equal_area", &angle_from_equal_area, py::arg("s"), py::arg("tube_ratio"),
+        release_gil());
+}
+
+void bind_coarse(py::module_& m) {
+  py::class_<CoarseSurface>(m, "CoarseSurface")
+      .def_readonly("kept", &CoarseSurface::kept)
+      .def_readonly("chart", &CoarseSurface::chart);
+  m.def("coarsen", &coarsen, py::arg("points").noconvert(), py::arg("chart"),
+        py::arg("turns").noconvert(), py::arg("n_faces"), release_gil());
+  m.def("prolong", &prolong, py::arg("coarse"), py::arg("chart"), py::arg("turns").noconvert(),
         release_gil());
 }
 
@@ -103,11 +114,12 @@ void bind_glide(py::module_& m) {
           py::arg("weights"), release_gil())
       .def(
           "project_rings",
-          [](SurfaceNewton& self, const SurfaceWeights& weights, double face_std,
-             double face_error) {
-            return self.project_rings(weights, face_std, face_error, signal_poll());
+          [](SurfaceNewton& self, const SurfaceWeights& weights, double face_std, double face_error,
+             int best_steps) {
+            return self.project_rings(weights, face_std, face_error, best_steps, signal_poll());
           },
-          py::arg("weights"), py::arg("face_std"), py::arg("face_error"), release_gil())
+          py::arg("weights"), py::arg("face_std"), py::arg("face_error"), py::arg("best_steps"),
+          release_gil())
       .def("measures", &SurfaceNewton::measures, release_gil())
       .def("least_facing", &SurfaceNewton::facing, release_gil())
       .def_property_readonly("angles", &SurfaceNewton::angles);
@@ -117,6 +129,7 @@ void bind_glide(py::module_& m) {
 
 void bind(py::module_& m) {
   bind_chart(m);
+  bind_coarse(m);
   bind_sem(m);
   bind_quality(m);
   bind_chart_newton(m);

@@ -15,9 +15,8 @@ namespace stretchmap::area {
 namespace {
 
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
-constexpr int kBestSteps = 2;        // towards it, of each kind
-constexpr int kStiffSteps = 6;
-constexpr double kGain = 1e-2;  // of a step after which its factor serves again
+constexpr int kStiffSteps = 6;       // towards it at most
+constexpr double kGain = 1e-2;       // of a step after which its factor serves again
 constexpr int kGlideTries = 30;
 constexpr double kHoldRotation = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
@@ -74,7 +73,7 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
 }
 
 bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std, double face_error,
-                                  const Poll& poll) {
+                                  int best_steps, const Poll& poll) {
   if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
   const SurfaceMeasures before = measures();
@@ -87,7 +86,7 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std
   };
   SurfaceMeasures now = before;
   try {
-    for (int step = 0; step < kBestSteps; ++step) now = take(RingStep::kBest);
+    for (int step = 0; step < best_steps; ++step) now = take(RingStep::kBest);
     RingStep kind = RingStep::kStiff;
     for (int step = 0; step < kStiffSteps && now.ring_std > kRingGoal; ++step) {
       const double sd = now.ring_std;

@@ -9,6 +9,9 @@ namespace stretchmap::area {
 
 namespace {
 
+constexpr Index kMostDirect = 30000;  // vertices
+constexpr double kRoughly = 1e-3;     // residual that does for a step of the fixed point
+
 // The constant is free: row and column of vertex 0 become the identity.
 SparseMatrix pinned(SparseMatrix matrix) {
   for (Index i = 0; i < matrix.outerSize(); ++i)
@@ -46,7 +49,8 @@ SemStep SurfaceSem::step() {
     solver_->matrix() = std::move(matrix);
     solver_->refactor();
   } else {
-    solver_.emplace(std::move(matrix), linalg::SpdOptions{"direct"});
+    const bool small = matrix.rows() <= kMostDirect;
+    solver_.emplace(std::move(matrix), linalg::SpdOptions{small ? "direct" : "multigrid"});
   }
   const Points2 product = chart_stretch_product(chart_, areas_, periods_, turns_, turns_);
   Rows right = -product;
@@ -55,6 +59,7 @@ SemStep SurfaceSem::step() {
   // Whatever comes of it is a direction of descent or not taken.
   linalg::SolveOptions options;
   options.must_converge = false;
+  if (solver_->backend() != "direct") options.tol = kRoughly;
   solver_->solve(right, direction, options);
   SemStep result;
   result.residual = 2.0 * (product * periods_.asDiagonal()).norm();

@@ -8,7 +8,6 @@ follow. Newton steps towards areas a bounded factor away get there (chart_newton
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,7 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress, report
 from ..maps.history import IterationRecord
-
-if TYPE_CHECKING:
-    pass
+from .coarse import Level
 
 # Excess of E_S over its bound, the variance of the ratios, up to which (4.5) has done its work.
 JAMMED = 1e-2
@@ -33,15 +30,11 @@ _SETTLED = 0.02  # share of the energy; a step that lowers it by less was the la
 
 
 def balance_areas(
-    chart: _core.area.SurfaceChart,
-    reference: _core.area.SurfaceReference,
-    aspect: float,
-    turns: NDArray[np.float64],
-    progress: Progress | None,
+    level: Level, progress: Progress | None
 ) -> tuple[NDArray[np.float64], list[IterationRecord]]:
-    """Turns (n, 2) with nearly equal area ratios, from turns without folded faces; records."""
+    """Turns (n, 2) with nearly equal area ratios, from the level's; records."""
     start = time.perf_counter()
-    newton = _core.area.ChartNewton(chart, reference, aspect, turns)
+    newton = _core.area.ChartNewton(level.chart, level.reference, level.aspect, level.turns)
     history: list[IterationRecord] = []
     weight, reach = 1.0, _REACH
     for iteration in range(1, _STEPS + 1):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 from .. import _core
 from ..base.progress import Progress, report
@@ -18,6 +19,9 @@ _GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
 _AT_REST = "energy at rest"
 _STALLED = 3  # steps in a row without any length end the iteration
+_ROUGH = 8.0  # times the tolerance
+_BEST_STEPS = 2  # of the projection of the rings
+_AHEAD = 3  # times the weight of the area term has grown at once on a finer surface
 _REST, _SLOW = 8, 0.01  # so many steps that lower the energy by less than this share end it, too
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
 _MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings need some room
@@ -51,47 +55,76 @@ def unfold_faces(
     return history
 
 
+@dataclass
+class Pace:
+    """Where the Newton steps of one surface ended, and those of a finer one begin."""
+
+    weight: float = 1.0  # of the area term
+    prolonged: bool = False  # from a coarser surface
+
+    def finer(self) -> Pace:
+        """Areas are right on the whole, so the area term may be heavy at once."""
+        return Pace(min(self.weight * _GROWTH**_AHEAD, _MOST_WEIGHT), prolonged=True)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Options of the Newton steps, as `area_map` takes them."""
+
+    max_iter: int
+    tol: float
+    shape_budget: float
+    balance: float = 1.0
+
+    def rough(self) -> Steps:
+        """For a coarse surface: the last per cent is paid with shears from face to face."""
+        return replace(self, tol=_ROUGH * self.tol)
+
+
 def finish_areas(
     newton: _core.area.SurfaceNewton,
     rings: bool,
-    max_iter: int,
-    tol: float,
-    shape_budget: float,
+    steps: Steps,
     progress: Progress | None,
-    balance: float = 1.0,
+    pace: Pace | None = None,
 ) -> tuple[list[IterationRecord], bool, str]:
-    """Newton steps on the polyhedral areas: records, converged, reason.
+    """Newton steps on the polyhedral areas: records, converged, reason; `pace` is moved on.
 
     Faces that look outward stay so; if some do not, that barrier is left out.
     """
     start = time.perf_counter()
     history: list[IterationRecord] = []
-    weight, least, heaviest = 1.0, math.inf, _MOST_WEIGHT**balance
+    pace = Pace() if pace is None else pace
+    # Steps that are best for the faces, too, cost as much as three Newton steps each.
+    tries = (0, _BEST_STEPS) if pace.prolonged else (_BEST_STEPS,)
+    tol = steps.tol
+    worst = _MARGIN * tol if pace.prolonged else tol
+    weight, least, heaviest = pace.weight, math.inf, _MOST_WEIGHT**steps.balance
     barrier = _FACING if newton.least_facing() > 0.0 else 0.0
     taken = None
     at_rest = _rest()
     reason = "most steps done"
-    for iteration in range(max_iter + 1):
+    for iteration in range(steps.max_iter + 1):
         if iteration:
             taken = newton.step(_weights(weight, barrier))
             if taken.step >= _FULL_STEP:
                 weight = min(weight * _GROWTH, heaviest)
         measured = newton.measures()
-        least = min(least, measured.angle_mean)
+        least, pace.weight = min(least, measured.angle_mean), weight
         history.append(_record("newton", iteration, taken, measured, start))
-        report(progress, "area", iteration, max_iter, face_std=measured.face_std)
-        if balance == 1.0 and measured.face_std <= _MARGIN * tol and _within(measured, tol):
+        report(progress, "area", iteration, steps.max_iter, face_std=measured.face_std)
+        if steps.balance == 1.0 and measured.face_std <= _MARGIN * tol and _within(measured, worst):
             break
-        if ended := _ended(measured, tol, taken, at_rest, shape_budget * least):
+        if ended := _ended(measured, tol, taken, at_rest, steps.shape_budget * least):
             if ended == _AT_REST and weight < heaviest:
                 weight, at_rest = min(weight * _GROWTH, heaviest), _rest()
                 continue
             reason = ended
             break
-    if balance < 1.0:
+    if steps.balance < 1.0:
         return history, reason == _AT_REST and history[-1].flips == 0, reason
     last = _weights(min(weight, _RING_WEIGHT), barrier)
-    if rings and newton.project_rings(last, tol, _RATIO_GOAL * tol):
+    if rings and any(newton.project_rings(last, tol, _RATIO_GOAL * tol, best) for best in tries):
         history.append(_record("newton", len(history), None, newton.measures(), start))
     return history, *_verdict(newton.measures(), tol, reason)
 

@@ -6,36 +6,31 @@ import dataclasses
 import logging
 import math
 import time
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from .. import _core
 from ..base.arrays import read_only
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
-from ..base.torus import Torus
+from ..base.torus import TWO_PI, Torus
 from ..certificate.checks import certify
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import CertificationError, OptionError
 from ..homology.basis import HomologyBasis
 from ..mesh.given import as_surface, require_same_mesh
-from .balance import JAMMED, balance_areas
-from .finish import finish_areas, unfold_faces
+from .coarse import Level, levels
+from .finish import Steps, finish_areas, unfold_faces
+from .flat import unfolded_turns
 from .result import AreaMap
-from .search import Ratio, search_phase
-from .sem import minimize_stretch, start_angles, unfolded_turns
+from .route import Finish, Route, follow
+from .search import Ratio
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
 __all__ = ["Finish", "area_map", "finished"]
 
-Finish = Literal["ring", "face", "none"]
-
 _log = logging.getLogger("stretchmap")
-
-# Source triangles longer than this are not asked to keep their shape.
-_MAX_ASPECT = 10.0
 
 _MOST_TURNS = 1e3  # a phase may have
 
@@ -131,6 +126,9 @@ def area_map(
     distortion, sigma its area ratio in the chart, infinite before a face turns over. The weight
     grows from step to step.
 
+    A surface of more than 40,000 faces is first mapped with fewer, by removing vertices; a step of
+    stretch energy minimisation and a few Newton steps follow on the surface itself.
+
     Examples
     --------
     >>> import stretchmap as sm
@@ -151,36 +149,19 @@ def area_map(
     conformal = _start(surface, basis, conformal, progress)
     clock = _lap(seconds, "conformal", clock)
 
-    chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
-    reference = _core.area.SurfaceReference(surface.V, surface.F, _MAX_ASPECT)
-    turns, history = minimize_stretch(surface, chart, conformal, sem_iter, progress)
+    finest = Level.of(
+        surface, unfolded_turns(surface, conformal), conformal.forms, conformal.aspect
+    )
     wanted = ratio if torus is None else torus.ratio
-    found = search_phase(surface, turns, conformal.aspect, phase, wanted)
-    if sem_iter and history[-1].energy > 1.0 + JAMMED:
-        balanced, records = balance_areas(
-            chart, reference, conformal.aspect, unfolded_turns(surface, chart, conformal), progress
-        )
-        other = search_phase(surface, balanced, conformal.aspect, phase, wanted)
-        # Where only few places are jammed, areas come at the price of all shapes.
-        if other[-1] < found[-1]:
-            turns, found = balanced, other
-            history += records
-    clock = _lap(seconds, "sem", clock)
-    phase, ratio, _ = found
-    angles = start_angles(chart, turns, phase, ratio)
-    clock = _lap(seconds, "phase", clock)
-
-    converged, reason = True, "stretch energy at rest"
-    if finish != "none":
-        newton = _core.area.SurfaceNewton(_core.area.GlideProblem(chart, reference, ratio), angles)
-        history += unfold_faces(newton, progress)
-        records, converged, reason = finish_areas(
-            newton, finish == "ring", max_iter, tol,
-            shape_budget if balance == 1.0 else math.inf, progress, balance,
-        )  # fmt: skip
-        history += records
-        angles = newton.angles
-    clock = _lap(seconds, "finish", clock)
+    steps = Steps(max_iter, tol, shape_budget if balance == 1.0 else math.inf, balance)
+    route = Route(phase, wanted, sem_iter, finish, steps)
+    made = follow(route, [finest] if finish == "none" else levels(finest), progress)
+    if made is None:  # a coarse map folds faces of the fine one
+        made = follow(route, [finest], progress)
+    angles, phase, ratio = made.angles, made.phase, made.ratio
+    history, converged, reason = made.history, made.converged, made.reason
+    seconds |= made.seconds
+    clock = time.perf_counter()
 
     if torus is None:
         torus = Torus.from_ratio(ratio, area=surface.area)
@@ -237,20 +218,17 @@ def finished(
 ) -> AreaMap:
     """An unfinished map with its folded faces turned, and up to ``max_iter`` steps on the areas."""
     clock = time.perf_counter()
-    surface = start.mesh
-    chart = _core.area.SurfaceChart(surface.topology, start.forms)
-    reference = _core.area.SurfaceReference(surface.V, surface.F, _MAX_ASPECT)
-    newton = _core.area.SurfaceNewton(
-        _core.area.GlideProblem(chart, reference, start.ratio), start.angles
-    )
+    level = Level.of(start.mesh, start.angles / TWO_PI, start.forms, start.ratio)
+    newton = level.newton(start.angles, start.ratio)
     unfolding = unfold_faces(newton, progress)
-    records, converged, reason = finish_areas(newton, False, max_iter, tol, math.inf, progress)
+    steps = Steps(max_iter, tol, math.inf)
+    records, converged, reason = finish_areas(newton, False, steps, progress)
     image = start.torus.xi(newton.angles[:, 0], newton.angles[:, 1])
     return dataclasses.replace(
         start,
         angles=read_only(newton.angles),
         image=read_only(image),
-        certificate=certify(surface, image, start.torus),
+        certificate=certify(start.mesh, image, start.torus),
         history=start.history + tuple(unfolding + records),
         converged=converged,
         stop_reason=reason,

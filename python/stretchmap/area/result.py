@@ -43,8 +43,9 @@ class AreaMap(MapResult):
     forms : ndarray, shape (2, e), int32
         Integer closed 1-forms of u and v, as in `ConformalMap`.
     history : tuple of IterationRecord
-        One record per iteration: stage ``"sem"`` measured in the equal-area chart, its energy E_S
-        (4.1) of shares, at least 1; stage ``"balance"``, Newton steps in that chart where the
+        One record per iteration: stage ``"coarse"`` where a surface of more than 40,000 faces was
+        mapped by way of coarser ones; stage ``"sem"`` measured in the equal-area chart, its energy
+        E_S (4.1) of shares, at least 1; stage ``"balance"``, Newton steps in that chart where the
         first jams; stages ``"untangle"`` and ``"newton"`` on the polyhedral image, the energy of
         the latter that of the finishing solve over the weight of its area term: within ``"sem"``
         and ``"newton"`` it never rises. There ``flips`` are the faces that do not look outward
