@@ -15,7 +15,7 @@ import stretchmap as sm
 from stretchmap import plot
 from stretchmap.samples import bumpy_torus
 
-result = sm.volume_map(bumpy_torus(12_000))
+result = sm.volume_map(bumpy_torus(6_000))
 sectors = plot.levels(result, by="u")
 
 # %%

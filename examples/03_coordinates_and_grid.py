@@ -16,7 +16,7 @@ from stretchmap import plot
 from stretchmap.resample.hexes import hex_mesh
 from stretchmap.samples import vertebra_like
 
-solid = vertebra_like(12_000)
+solid = vertebra_like(5_000)
 result = sm.volume_map(solid)
 points = result.mesh.V[result.mesh.T].mean(axis=1)
 u, v, s = result.coordinates(points).T
@@ -36,7 +36,7 @@ angle = plot.cutaway(result)
 
 # %%
 # A grid of the solid torus pulled back.
-grid = hex_mesh(result, sections=48)
+grid = hex_mesh(result, sections=24)
 print(grid.summary())
 assert grid.n_invalid == 0
 if len(sys.argv) > 1:

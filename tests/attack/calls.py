@@ -1,10 +1,10 @@
 """Every public function is called with every hostile value for every argument.
 
-Run: python tests/attack/calls.py [--rounds N] [--seed S] [--only NAME]
+Run: python tests/attack/calls.py [--rounds N] [--seed S] [--only NAME ...]
 
 A round calls each function once with each hostile value for each argument, the others sound;
 further rounds give hostile values to two arguments at a time, drawn at random. What went wrong is
-printed as it happens, the last line counts.
+printed as it happens; then follow the calls of each NAME, the last line counts them all.
 """
 
 from __future__ import annotations
@@ -77,14 +77,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", default="", help="part of the name of a function")
+    parser.add_argument("--only", nargs="*", default=[""], help="parts of the names of functions")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
         serve()
         return 0
-    every = jobs(entries(Sound()), options.only, options.rounds, options.seed)
-    tally = watch.run(Path(__file__), every, LIMIT)
+    found = entries(Sound())
+    rooms = {only: jobs(found, only, options.rounds, options.seed) for only in options.only}
+    tally = watch.run(Path(__file__), [job for room in rooms.values() for job in room], LIMIT)
+    for only, room in rooms.items():
+        print(f"{only}: {len(room)}")
     print(tally.line("calls"))
     return 1 if tally.bad else 0
 

@@ -21,7 +21,7 @@ METHODS = [m for m in ("fork", "spawn") if m in multiprocessing.get_all_start_me
 
 def mapped(seed: int) -> bytes:
     """A map made with two threads, as a user's worker would."""
-    solid = sm.samples.vertebra_like(1500, seed=seed)
+    solid = sm.samples.vertebra_like(700, seed=seed)
     return np.asarray(sm.volume_map(solid, threads=2).image).tobytes()
 
 
