@@ -23,6 +23,9 @@ from ..mesh.exchange import Cells
 from ..mesh.meshes import TetMesh
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from ..maps.result import MapResult
 
 __all__ = ["Morph", "morph"]
@@ -134,25 +137,62 @@ class Morph(HasSummary):
                 temporary.write_text(text, encoding="utf-8")
         return [*frames, path]
 
-    def _save_picture(self, path: Path) -> list[Path]:
+    def picture(self, count: int = 4) -> Figure:
+        """Some frames side by side, from the first to the last.
+
+        Colors run along the source, and stay with their places.
+
+        Parameters
+        ----------
+        count : int
+            Number of frames shown, from 2 to as many as there are.
+
+        Raises
+        ------
+        OptionError
+            There are not so many frames.
+        MissingDependencyError
+            matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import stretchmap as sm
+        >>> way = sm.morph(sm.volume_map(sm.samples.solid_torus(600)), frames=5)
+        >>> [axes.get_title() for axes in way.picture(3).axes]
+        ['t = 0.00', 't = 0.50', 't = 1.00']
+        """
+        from .style import empty_figure
+
+        count = whole("count", count, 2, len(self.times))
+        figure = empty_figure(3.0 * count, 3.4)
+        shown = np.linspace(0, len(self.times) - 1, count).round().astype(int)
+        for axes, i in zip(np.ravel(figure.subplots(1, count)), shown, strict=True):
+            self._draw(axes, int(i))
+        return figure
+
+    def _draw(self, axes: Axes, i: int) -> None:
         from .painting import Scene
-        from .style import along, broad_view, empty_figure
+        from .style import along, broad_view
+
+        ids, faces = self.solid.boundary_vertices, self.solid.surface.F
+        start = self.solid.V[ids]
+        scene = Scene(broad_view(start))
+        scene.add_faces(self.frame(i)[ids][faces], along(start[faces].mean(axis=1), start))
+        scene.draw(axes, np.concatenate([start, self.image[ids]]))
+        axes.set_title(f"t = {self.times[i]:.2f}", fontsize=10)
+
+    def _save_picture(self, path: Path) -> list[Path]:
+        from .style import empty_figure
 
         figure = empty_figure(5.0, 4.6)
         from matplotlib.animation import FuncAnimation, PillowWriter
 
         axes = figure.add_subplot()
-        ids, faces = self.solid.boundary_vertices, self.solid.surface.F
-        start = self.solid.V[ids]
-        around = np.concatenate([start, self.image[ids]])
-        colors = along(start[faces].mean(axis=1), start)
 
         def draw(i: int) -> list[Any]:
             axes.clear()
-            scene = Scene(broad_view(start))
-            scene.add_faces(self.frame(i)[ids][faces], colors)
-            scene.draw(axes, around)
-            return [axes.set_title(f"t = {self.times[i]:.2f}", fontsize=10)]
+            self._draw(axes, i)
+            return [axes.title]
 
         # There and back, so that the end meets the beginning.
         order = [*range(len(self.times)), *range(len(self.times) - 2, 0, -1)]

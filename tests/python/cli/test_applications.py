@@ -77,9 +77,14 @@ def test_morph_files(bumpy_map, tmp_path):
 def test_morph_picture(bumpy_map, tmp_path):
     pytest.importorskip("matplotlib")
     pillow = pytest.importorskip("PIL.Image")
-    morph(bumpy_map, 3).save(tmp_path / "m.gif")
+    result = morph(bumpy_map, 3)
+    result.save(tmp_path / "m.gif")
     with pillow.open(tmp_path / "m.gif") as picture:
         assert picture.n_frames == 4
+    assert [axes.get_title() for axes in result.picture(2).axes] == ["t = 0.00", "t = 1.00"]
+    for count in (1, 4):
+        with pytest.raises(OptionError):
+            result.picture(count)
 
 
 def test_register_command(folder, capsys):

@@ -27,24 +27,28 @@ _IMPORTS = (
 )
 
 
-def drawn(body, folder):
-    """Run Python code that saves a scene as x.png; skips where nothing can be drawn."""
+def run(code, folder):
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, env=ENV
+    )
+
+
+@pytest.fixture(scope="module")
+def can_draw(tmp_path_factory):
     pytest.importorskip("pyvista")
     probe = "import pyvista; pyvista.Plotter(off_screen=True).screenshot('probe.png')"
-    for code in (
-        probe,
-        f"{_IMPORTS}\n{body}",
-    ):
-        run = subprocess.run(
-            [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, env=ENV
-        )
-        if code is probe and run.returncode:
-            pytest.skip("PyVista cannot draw here")
-    assert run.returncode == 0, run.stderr
+    if run(probe, tmp_path_factory.mktemp("probe")).returncode:
+        pytest.skip("PyVista cannot draw here")
+
+
+def drawn(body, folder):
+    """Run Python code that saves a scene as x.png."""
+    done = run(f"{_IMPORTS}\n{body}", folder)
+    assert done.returncode == 0, done.stderr
     return (folder / "x.png").read_bytes()
 
 
-def test_a_cut_is_drawn(tmp_path):
+def test_a_cut_is_drawn(tmp_path, can_draw):
     picture = drawn(
         "m = sm.volume_map(samples.bumpy_torus(1500), c=1, max_iter=1)\n"
         "scene.save(scene.cut(m, 'ratio'), 'x.png')",
@@ -53,7 +57,7 @@ def test_a_cut_is_drawn(tmp_path):
     assert picture.startswith(b"\x89PNG") and len(picture) > 10_000
 
 
-def test_loops_are_drawn(tmp_path):
+def test_loops_are_drawn(tmp_path, can_draw):
     picture = drawn("scene.save(scene.loops(samples.double_torus(1)), 'x.png')", tmp_path)
     assert picture.startswith(b"\x89PNG") and len(picture) > 10_000
 
@@ -71,21 +75,20 @@ def test_wrong_requests_are_refused(area, monkeypatch):
         scene.cut(solid)
 
 
-def test_a_notebook_shows_a_scene(tmp_path):
-    drawn("scene.save(scene.loops(samples.double_torus()), 'x.png')", tmp_path)  # or skips
+def test_a_notebook_shows_a_scene(can_draw):
     nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
     pytest.importorskip("ipykernel")
-    cell = f"{_IMPORTS}\nscene.widget(scene.loops(samples.double_torus()))"
+    cell = f"{_IMPORTS}\nscene.widget(scene.loops(samples.double_torus(1)))"
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell)])
     nbclient.NotebookClient(notebook, timeout=60).execute()
     (shown,) = (out.data for out in notebook.cells[0].outputs if "data" in out)
     assert {"image/png", "text/html"} & set(shown)
 
 
-def test_elsewhere_a_widget_is_refused(tmp_path):
+def test_elsewhere_a_widget_is_refused(tmp_path, can_draw):
     drawn(
-        "try:\n    scene.widget(scene.loops(samples.double_torus()))\n"
+        "try:\n    scene.widget(scene.loops(samples.double_torus(1)))\n"
         "except sm.errors.OptionError as error:\n    assert 'notebooks' in str(error)\n"
-        "    scene.save(scene.loops(samples.double_torus()), 'x.png')",
+        "    scene.save(scene.loops(samples.double_torus(1)), 'x.png')",
         tmp_path,
     )
