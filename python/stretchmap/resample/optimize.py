@@ -38,10 +38,12 @@ _FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
 _TOLERANCE = 0.005  # of the diagonal: larger gaps count more ...
-_NORM = 2.0  # ... with the power 2 _NORM
+_NORM = 2.0  # ... with the power 2 _NORM at least, ...
+_NORM_SHARE = 2.0 / 3.0  # ... in the end with twice this share of that of the shape
 _OFFSET = 0.5  # share by which the error of the volume is made good from round to round ...
 _MOST_OFFSET = 1.0  # ... by a surface moved in or out by this many tolerances at most
 _LOOSER = 0.6  # factor of the fit where it is in the way
+_HALVINGS = 4  # of a round whose steps led away from the surface
 _HARDER = 2.0  # factor of the weight of a hexahedron each time it is found invalid
 _REPAIRS = 10
 _INVALID_ROUNDS = 12
@@ -105,6 +107,7 @@ class GridOptimizer:
         self._log_size = np.log(_core.resample.hex_volumes(V, H).sum() / len(H)) / 3.0
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
+        self._largest_gap = np.inf
 
     def run(self, schedule: Schedule, progress: Progress | None = None) -> bool:
         """All stages; stops early, and returns False, where corners cannot be made positive.
@@ -160,7 +163,12 @@ class GridOptimizer:
         most = _MOST_OFFSET * self._tolerance
         self._inward = float(np.clip(self._inward + _OFFSET * excess / self._area, -most, most))
         # What the shape gains in weight, the fit gains, too.
-        self._descend(power, fit * np.sqrt(power), _NORM)
+        self._descend(power, fit * np.sqrt(power), self._norm(power))
+
+    def _norm(self, power: float) -> float:
+        """Power of the gaps; that of a grid too coarse to get near the surface stays low."""
+        gap = max(self._largest_gap / self._tolerance, 1.0)
+        return _NORM + max(_NORM_SHARE * power - _NORM, 0.0) / gap**2
 
     def _descend(self, power: float, strength: float, norm: float) -> None:
         """Newton steps under the barrier, which guarded triples have to be inside of first."""
@@ -170,7 +178,22 @@ class GridOptimizer:
                 self._guarded &= _core.resample.least_edge_jacobians(self.V, self.H) > 0.0
             self._prepare(strength, norm, guard=False)
         if self._min_det() > 0.0:
-            self.V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS, tol=_RESIDUAL)
+            self._advance(power, strength, norm)
+
+    def _advance(self, power: float, strength: float, norm: float) -> None:
+        """Newton steps, shortened until the energy falls with the samples of where they lead to.
+
+        The samples' tangent planes hold nothing where the surface bends away from them: points that
+        glide round a sharp crest leave it, and the round after would send them back.
+        """
+        before = self._newton.value(self.V, _corner(0.0), power).energy
+        V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS, tol=_RESIDUAL)
+        for _ in range(_HALVINGS + 1):
+            self._match(V, strength, norm)
+            if self._newton.value(V, _corner(0.0), power).energy < before:
+                self.V = V
+                return
+            V = 0.5 * (self.V + V)
 
     def _repaired(self) -> bool:
         """Whether all guarded triples are positive after regularized steps; undone if not.
@@ -205,7 +228,11 @@ class GridOptimizer:
         if guard:
             self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
         self._newton.set_rest(self._sides(_MEAN, pull), self._weights, self._guarded)
-        samples = self._fit.match(self.V, self._inward)
+        self._match(self.V, strength, norm)
+
+    def _match(self, V: NDArray[np.float64], strength: float, norm: float) -> None:
+        samples = self._fit.match(V, self._inward)
+        self._largest_gap = float(samples.distance.max())
         factor = strength * self._strength * samples.share
         self._newton.set_fit(samples, factor, self._tolerance, norm)
 
