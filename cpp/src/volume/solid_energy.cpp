@@ -92,7 +92,10 @@ SolidEnergy::Energies SolidEnergy::energies(const PointsRef& x, const EnergyWeig
 }
 
 EnergyReport SolidEnergy::value(const PointsRef& x, const EnergyWeights& w) const {
-  const Energies found = energies(x, w);
+  return summed(energies(x, w));
+}
+
+EnergyReport SolidEnergy::summed(const Energies& found) {
   EnergyReport report;
   report.energy = blocked_sum(found.tets);
   if (found.faces.size() > 0) {

@@ -16,8 +16,7 @@ constexpr double kShifts[] = {0.0, 1e-8, 1e-4, 1e-1, 10.0};
 constexpr double kRounding = 1e-12;   // a predicted decrease that is no more of the energy is none
 constexpr double kEnergyShare = 0.2;  // see SolveOptions
 constexpr int kTries = 21;            // of the line search
-constexpr int kProjected = 8;  // new Hessians without negative parts after one was indefinite
-constexpr int kEasings = 6;
+constexpr int kProjected = 8;        // new Hessians without negative parts after one was indefinite
 constexpr double kRise = 0.01;       // of the decrease predicted, by a single element: uphill
 constexpr double kWorthwhile = 0.2;  // of the decrease predicted
 constexpr double kHeldUp = 0.5;      // a shorter step is worth a look at who holds it up
@@ -67,6 +66,7 @@ void SolidNewton::try_held_back(Points& x, const Points& start, Points& directio
 // The Hessian and its preconditioner. Sums of terms of very different size can come out indefinite
 // in rounding, so the diagonal grows until they serve; false if the matrix is not even finite.
 bool SolidNewton::linearize(const PointsRef& x, const EnergyWeights& w) {
+  negative_ = w.negative;
   for (const double shift : kShifts) {
     try {
       if (solver_) {
@@ -146,18 +146,13 @@ bool SolidNewton::descend(const NewtonOptions& options, const Poll& poll, Points
 // If single elements go uphill: the others' whole step, theirs shortened.
 void SolidNewton::try_eased(Points& x, const Points& start, Points& direction,
                             const EnergyWeights& w, NewtonReport& report) const {
-  Points eased = direction;
-  for (int pass = 0; pass < kEasings; ++pass) {
-    eased = energy_.eased(start, eased, w, kRise * report.decrement);
-    Points trial = energy_.move(start, eased, 1.0);
-    const EnergyReport there = energy_.value(trial, w);
-    if (!(there.energy < report.after.energy)) continue;
-    x = std::move(trial);
-    direction = eased;
-    report.after = there;
-    report.alpha = 1.0;
-    if (report.before.energy - there.energy > kWorthwhile * report.decrement) return;
-  }
+  EasedStep eased =
+      energy_.eased(start, direction, w, kRise * report.decrement, kWorthwhile * report.decrement);
+  if (!(eased.there.energy < report.after.energy)) return;
+  x = std::move(eased.image);
+  direction = std::move(eased.step);
+  report.after = eased.there;
+  report.alpha = 1.0;
 }
 
 bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights& w,
@@ -191,7 +186,7 @@ bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights
 bool SolidNewton::solve_projected(const PointsRef& x, EnergyWeights w, const NewtonOptions& options,
                                   const Poll& poll, Points& direction, NewtonReport& report) {
   changes_.clear();
-  const bool projected = w.negative == 0.0;
+  const bool projected = negative_ == 0.0;
   if (!projected) projected_ = kProjected;
   w.negative = 0.0;
   if (projected)
@@ -201,13 +196,21 @@ bool SolidNewton::solve_projected(const PointsRef& x, EnergyWeights w, const New
   return descend(options, poll, direction, report);
 }
 
+// As a rule the step begins where the last one ended.
+EnergyReport SolidNewton::start_value(const PointsRef& x, const EnergyWeights& w) {
+  const EnergyWeights& last = end_weights_;
+  const bool same = w.shape == last.shape && w.volume == last.volume && w.face == last.face &&
+                    w.epsilon == last.epsilon;
+  return same && end_.rows() == x.rows() && end_ == x ? end_report_ : energy_.value(x, w);
+}
+
 NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
                                const NewtonOptions& options, const Poll& poll) {
   NewtonReport report;
   EnergyWeights w = weights;
   w.negative = projected_ > 0 ? 0.0 : options.negative;
   if (projected_ > 0 && !options.keep_hessian) --projected_;
-  report.before = report.after = energy_.value(x, w);
+  report.before = report.after = start_value(x, w);
   if (!std::isfinite(report.before.energy))
     throw Error("SolverError", "the energy is infinite: " + std::to_string(report.before.flips) +
                                    " inverted tets and " + std::to_string(report.before.folds) +
@@ -231,6 +234,9 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
     if (search(x, direction, w, report)) break;
     if (report.decrement <= kRounding * std::abs(report.before.energy)) break;
   }
+  end_ = x;
+  end_weights_ = w;
+  end_report_ = report.after;
   return report;
 }
 

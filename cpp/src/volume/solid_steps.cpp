@@ -14,6 +14,7 @@ using Eigen::Vector3d;
 // for.
 constexpr double kShare = 0.9, kWholeStep = 1.0 / kShare;
 constexpr int kHoldingPasses = 6;
+constexpr int kEasingPasses = 6;
 constexpr double kEasing = 0.25;  // what is left of a step at the vertices of an element it harms
 
 }  // namespace
@@ -70,20 +71,41 @@ Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
   return shortened;
 }
 
-Points SolidEnergy::eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w,
-                          double most) const {
-  const Energies before = energies(x, w), after = energies(move(x, step, 1.0), w);
-  Vec share = Vec::Ones(x.rows());
+EasedStep SolidEnergy::eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w,
+                             double most, double enough) const {
+  EasedStep best;
+  const Energies before = energies(x, w);
+  Points shortened = step;
+  Energies after = energies(move(x, shortened, 1.0), w);
+  const double goal = summed(before).energy - enough;
+  for (int pass = 0; pass < kEasingPasses && shorten(before, after, most, shortened); ++pass) {
+    Points image = move(x, shortened, 1.0);
+    after = energies(image, w);
+    const EnergyReport there = summed(after);
+    if (!(there.energy < best.there.energy)) continue;
+    best = {shortened, std::move(image), there};
+    if (there.energy < goal) break;
+  }
+  return best;
+}
+
+// A share of the step at the vertices of the elements it raises by more than `most`; whether there
+// are any.
+bool SolidEnergy::shorten(const Energies& before, const Energies& after, double most,
+                          Points& step) const {
+  Flags harmed = Flags::Zero(motion_.size());
+  bool any = false;
   const auto hold = [&](const auto& corners, double rise) {
     if (rise <= most) return;
-    for (const Index i : corners) share[i] = kEasing;
+    any = true;
+    for (const Index i : corners) harmed[i] = 1;
   };
   for (Index t = 0; t < before.tets.size(); ++t) hold(tets_.row(t), after.tets[t] - before.tets[t]);
   for (Index f = 0; f < before.faces.size(); ++f)
     hold(barrier_.faces().row(f), after.faces[f] - before.faces[f]);
-  Points shortened = step;
-  for (Index row = 0; row < rows(); ++row) shortened.row(row) *= share[row_vertex_[row]];
-  return shortened;
+  for (Index row = 0; any && row < rows(); ++row)
+    if (harmed[row_vertex_[row]]) step.row(row) *= kEasing;
+  return any;
 }
 
 Rows SolidEnergy::near_nullspace(const PointsRef& x) const {

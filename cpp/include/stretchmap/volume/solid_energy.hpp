@@ -11,6 +11,7 @@
 // of threads. Rows are numbered along a space-filling curve.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "stretchmap/linalg/block_solver.hpp"
@@ -28,6 +29,12 @@ struct EnergyReport {
   Index flips = 0;          // tets with det J <= 0
   double min_facing = 1.0;  // least sigma_k of the gliding faces, see boundary_barrier.hpp
   Index folds = 0;          // faces with one that is not positive
+};
+
+// A step shortened at some vertices, where it leads, and the energy there.
+struct EasedStep {
+  Points step, image;
+  EnergyReport there{std::numeric_limits<double>::infinity()};
 };
 
 struct SolidElements {
@@ -75,10 +82,11 @@ class SolidEnergy {
 
   // Where vertices glide, a few may go uphill that the model sends down: at the edges of a mesh it
   // knows the surface on one side only.
-  // \return the step, shortened at the vertices of those elements whose energy it raises by more
-  //         than `most`.
-  Points eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w,
-               double most) const;
+  // The step is shortened at the vertices of those elements whose energy it raises by more than
+  // `most`, again and again until the energy falls by `enough`.
+  // \return the best of these; an infinite energy if there are none.
+  EasedStep eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w, double most,
+                  double enough) const;
 
   // \return (3 rows, 3) three translations as seen from the vertex frames.
   Rows near_nullspace(const PointsRef& x) const;
@@ -98,6 +106,8 @@ class SolidEnergy {
     Vec faces, facing;  // (m), empty without a barrier
   };
   Energies energies(const PointsRef& x, const EnergyWeights& w) const;
+  static EnergyReport summed(const Energies& found);
+  bool shorten(const Energies& before, const Energies& after, double most, Points& step) const;
   void number_sites();
   void build_pattern();
   void find_face_slots();

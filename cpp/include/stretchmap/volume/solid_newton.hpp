@@ -44,6 +44,7 @@ class SolidNewton {
   void set_targets(const VecRef& target) {
     energy_.set_targets(target);
     new_targets_ = true;
+    end_.resize(0, 3);
   }
 
   // One inexact Newton step. The energy never rises, and with
@@ -69,6 +70,7 @@ class SolidNewton {
     double inverse;  // 1 / (step . gradient)
   };
 
+  EnergyReport start_value(const PointsRef& x, const EnergyWeights& w);
   bool renew(const PointsRef& x, const EnergyWeights& w, bool keep);
   bool solve_projected(const PointsRef& x, EnergyWeights w, const NewtonOptions& options,
                        const Poll& poll, Points& direction, NewtonReport& report);
@@ -77,7 +79,11 @@ class SolidNewton {
                NewtonReport& report);
 
   SolidEnergy energy_;
+  Points end_;  // of the last step, and the energy there; no rows if it is not known
+  EnergyWeights end_weights_;
+  EnergyReport end_report_;
   std::unique_ptr<linalg::BlockSolver> solver_;
+  double negative_ = 0.0;          // share of negative parts in the Hessian at hand
   int projected_ = 0;              // Hessians still to be made without negative parts
   Points gradient_;                // at the current point
   Vec last_gradient_, last_step_;  // before the last step, and the step; empty after a renewal
