@@ -18,7 +18,7 @@ import stretchmap as sm
 from stretchmap import _core
 from stretchmap.resample.quality import boundary_quads
 
-_LIMIT = 1.0  # % of the diagonal, the end of the colors
+_LIMIT = 0.5  # % of the diagonal, the end of the colors
 _POOR = 0.3
 
 
@@ -46,7 +46,7 @@ def panel(axes, surface: sm.TriMesh, V, H, title: str) -> None:
         )
     low, high = V.min(axis=0), V.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.3)
+    axes.set_box_aspect(high - low, zoom=1.1)
     way = centers[distance.argmax()] - 0.5 * (low + high)
     axes.view_init(np.degrees(np.arctan2(way[2], np.hypot(*way[:2]))) + 20.0,
                    np.degrees(np.arctan2(way[1], way[0])) + 30.0)  # fmt: skip

@@ -41,7 +41,8 @@ _FINER = Schedule(
     fit=3.0,
     powers=(*(2.0,) * 2, *(3.0,) * 2, *(4.0,) * 2, *(6.0,) * 3, *(8.0,) * 3, *(12.0,) * 3),
 )
-_FINEST = Schedule(fit=3.0, powers=(2.0, 4.0, 8.0, 12.0))
+_BETWEEN = Schedule(fit=3.0, powers=(2.0, 3.0, 4.0, 6.0, 8.0, 12.0))  # to be split once more
+_FINEST = Schedule(fit=3.0, powers=(4.0, 8.0, 12.0), steps=1)  # split twice or more
 
 
 def hex_mesh(
@@ -141,7 +142,9 @@ def hex_mesh(
             finer = prolongation(*(k * 2**level for k in start.numbers))
             layout = swept_layout(*(k * 2 ** (level + 1) for k in start.numbers))
             V, pulled = (np.ascontiguousarray(finer @ points) for points in (V, pulled))
-            V = _optimized(V, layout.H, solid, _FINER if level == 0 else _FINEST, progress)
+            last = _FINER if levels == 1 else _FINEST
+            schedule = last if level == levels - 1 else _BETWEEN
+            V = _optimized(V, layout.H, solid, schedule, progress)
         if levels:
             grid = torus.xi(layout.u, layout.v, layout.share * torus.r)
     if len(thicknesses):

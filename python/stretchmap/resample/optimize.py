@@ -26,7 +26,6 @@ __all__ = ["GridOptimizer", "Schedule"]
 
 _VOLUME_WEIGHT = 0.1
 _LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
-_STEPS = 3  # Newton steps between two looks at boxes and samples
 _RESIDUAL = 0.01  # of their linear systems
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
@@ -61,6 +60,8 @@ class Schedule:
         Factor of the fit of the boundary.
     powers : tuple of float
         Power p of each round after that, see `hex_energy.hpp`.
+    steps : int
+        Newton steps between two looks at boxes and samples.
     """
 
     untangle: int = 40
@@ -74,6 +75,7 @@ class Schedule:
         *(8.0,) * 8,
         *(12.0,) * 10,
     )
+    steps: int = 3
 
 
 class GridOptimizer:
@@ -107,6 +109,7 @@ class GridOptimizer:
         self._log_size = np.log(_core.resample.hex_volumes(V, H).sum() / len(H)) / 3.0
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
+        self._steps = Schedule.steps
         self._largest_gap = np.inf
 
     def run(self, schedule: Schedule, progress: Progress | None = None) -> bool:
@@ -117,6 +120,7 @@ class GridOptimizer:
         SolverError
             A linear solve broke down.
         """
+        self._steps = schedule.steps
         if not self._untangle(schedule.untangle, progress):
             return False
         valid = None
@@ -187,7 +191,7 @@ class GridOptimizer:
         glide round a sharp crest leave it, and the round after would send them back.
         """
         before = self._newton.value(self.V, _corner(0.0), power).energy
-        V, _ = self._newton.run(self.V, _corner(0.0), power, _STEPS, tol=_RESIDUAL)
+        V, _ = self._newton.run(self.V, _corner(0.0), power, self._steps, tol=_RESIDUAL)
         for _ in range(_HALVINGS + 1):
             self._match(V, strength, norm)
             if self._newton.value(V, _corner(0.0), power).energy < before:
@@ -215,7 +219,7 @@ class GridOptimizer:
 
     def _regularized(self, min_det: float) -> None:
         epsilon = float(np.clip(-0.5 * min_det, _LEAST_EPSILON, _LARGEST_EPSILON))
-        self.V, _ = self._newton.run(self.V, _corner(epsilon), 1.0, _STEPS)
+        self.V, _ = self._newton.run(self.V, _corner(epsilon), 1.0, Schedule.steps)
 
     def _prepare(
         self, strength: float, norm: float, *, guard: bool = True, pull: float = _PULL
