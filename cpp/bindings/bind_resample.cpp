@@ -33,8 +33,7 @@ void bind(py::module_& m) {
            py::arg("normals").noconvert(), py::arg("sample_faces").noconvert(),
            py::arg("sample_weights").noconvert(), py::arg("quads").noconvert(), py::arg("per_side"),
            py::arg("far"), release_gil())
-      .def("match", &BoundaryFit::match, py::arg("x").noconvert(), py::arg("inward") = 0.0,
-           release_gil());
+      .def("match", &BoundaryFit::match, py::arg("x").noconvert(), release_gil());
 
   py::class_<HexReport>(m, "HexReport")
       .def_readonly("energy", &HexReport::energy)
@@ -58,11 +57,11 @@ void bind(py::module_& m) {
       .def(
           "set_fit",
           [](HexNewton& self, const FitSamples& samples, const VecRef& factor, double tolerance,
-             double power) {
-            self.energy().set_fit(samples, factor, {tolerance, power});
+             double power, double inward) {
+            self.energy().set_fit(samples, factor, {tolerance, power, inward});
           },
           py::arg("samples"), py::arg("factor").noconvert(), py::arg("tolerance") = 1.0,
-          py::arg("power") = 1.0, release_gil())
+          py::arg("power") = 1.0, py::arg("inward") = 0.0, release_gil())
       .def(
           "value",
           [](const HexNewton& self, const PointsRef& x, const volume::EnergyWeights& corner,

@@ -42,7 +42,7 @@ RowVector3d BoundaryFit::direction(const RowVector3d& normal, const RowVector3d&
   return sum.normalized();
 }
 
-FitSamples BoundaryFit::match(const PointsRef& x, double inward) const {
+FitSamples BoundaryFit::match(const PointsRef& x) const {
   FitSamples out;
   const Index q = static_cast<Index>(quads_.rows()) * per_side_ * per_side_;
   const Index s = q + static_cast<Index>(sites_.rows());
@@ -55,7 +55,6 @@ FitSamples BoundaryFit::match(const PointsRef& x, double inward) const {
   out.distance.resize(s);
   match_quads(x, out);
   match_surface(x, out);
-  out.point -= inward * out.normal;
   return out;
 }
 

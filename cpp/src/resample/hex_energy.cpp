@@ -98,11 +98,11 @@ void HexEnergy::load(const PointsRef& x, Index h, int part, ElementBatch& batch)
   }
 }
 
-// From the tangent plane of sample j.
+// From the tangent plane of sample j, moved inwards.
 double HexEnergy::gap(const PointsRef& x, Index j) const {
   RowVector3d p = -fit_.point.row(j);
   for (int c = 0; c < 4; ++c) p += fit_.weights(j, c) * x.row(fit_.corners(j, c));
-  return p.dot(fit_.normal.row(j));
+  return p.dot(fit_.normal.row(j)) + norm_.inward;
 }
 
 HexReport HexEnergy::value(const PointsRef& x, const HexWeights& w) const {

@@ -17,7 +17,7 @@ class FitSamples:
 class BoundaryFit:
     def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], normals: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], sample_faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], sample_weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], quads: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], per_side: typing.SupportsInt | typing.SupportsIndex, far: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
-    def match(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], inward: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> FitSamples:
+    def match(self, x: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> FitSamples:
         ...
 class HexReport:
     @property
@@ -54,7 +54,7 @@ class HexNewton:
         """
     def run(self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], corner: stretchmap._core.volume.EnergyWeights, power: typing.SupportsFloat | typing.SupportsIndex, max_steps: typing.SupportsInt | typing.SupportsIndex, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.001, tol: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], HexNewtonReport]:
         ...
-    def set_fit(self, samples: FitSamples, factor: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], tolerance: typing.SupportsFloat | typing.SupportsIndex = 1.0, power: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+    def set_fit(self, samples: FitSamples, factor: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], tolerance: typing.SupportsFloat | typing.SupportsIndex = 1.0, power: typing.SupportsFloat | typing.SupportsIndex = 1.0, inward: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def set_rest(self, sides: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 24]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], guarded: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8, "[m, 1]"]) -> None:
         ...

@@ -111,6 +111,7 @@ class GridOptimizer:
         self._guarded = np.zeros(len(H), bool)
         self._steps = Schedule.steps
         self._largest_gap = np.inf
+        self._matched: NDArray[np.float64] | None = None  # the points of self._samples
 
     def run(self, schedule: Schedule, progress: Progress | None = None) -> bool:
         """All stages; stops early, and returns False, where corners cannot be made positive.
@@ -235,10 +236,11 @@ class GridOptimizer:
         self._match(self.V, strength, norm)
 
     def _match(self, V: NDArray[np.float64], strength: float, norm: float) -> None:
-        samples = self._fit.match(V, self._inward)
-        self._largest_gap = float(samples.distance.max())
-        factor = strength * self._strength * samples.share
-        self._newton.set_fit(samples, factor, self._tolerance, norm)
+        if self._matched is not V:
+            self._samples, self._matched = self._fit.match(V), V
+            self._largest_gap = float(self._samples.distance.max())
+        factor = strength * self._strength * self._samples.share
+        self._newton.set_fit(self._samples, factor, self._tolerance, norm, self._inward)
 
     def _sides(self, mean: float, pull: float) -> NDArray[np.float64]:
         """(k, 24) sides of the corners' boxes: their own edges, drawn to local means, and hexahedra
@@ -255,8 +257,8 @@ class GridOptimizer:
     def _mean_sides(self) -> NDArray[np.float64]:
         """(k, 3) logarithms of mean lengths of parallel edges, smoothed over the hexahedra round
         each point."""
-        ends = self.V[self.H[:, EDGES]]  # (k, 3, 4, 2, 3)
-        lengths = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1).mean(axis=-1)
+        edges = self.V[self.H[:, EDGES[..., 1]]] - self.V[self.H[:, EDGES[..., 0]]]
+        lengths = np.sqrt(np.einsum("kdei,kdei->kde", edges, edges)).mean(axis=-1)
         logs = np.log(np.maximum(lengths, 1e-12 * lengths.max()))
         corners = self.H.ravel()
         for _ in range(_SMOOTHING):

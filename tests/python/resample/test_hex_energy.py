@@ -43,7 +43,7 @@ def test_gradient_and_hessian_are_those_of_the_value(epsilon, power, guarded):
     sides, weights = rng.uniform(0.5, 1.5, (len(H), 24)), rng.uniform(0.5, 1.5, len(H))
     newton.set_rest(sides, weights, np.full(len(H), guarded))
     samples_ = a_fit(H).match(V)
-    newton.set_fit(samples_, rng.uniform(1.0, 2.0, len(samples_.share)), 0.05, power)
+    newton.set_fit(samples_, rng.uniform(1.0, 2.0, len(samples_.share)), 0.05, power, 0.03)
     corner = _core.volume.EnergyWeights(1.0, 0.2, epsilon)
     gradient, start, col, values = newton.model(V, corner, power)
     way = rng.standard_normal(V.shape)
@@ -58,6 +58,26 @@ def test_gradient_and_hessian_are_those_of_the_value(epsilon, power, guarded):
     # The Hessian of the elements is projected, so it bounds the true curvature from above.
     true = (newton.model(V + step * way, corner, power)[0] - gradient) / step
     assert (way * true).sum() <= (way.ravel() @ hessian @ way.ravel()) * (1.0 + 1e-4)
+
+
+def test_a_round_lowers_the_energy_with_the_samples_of_where_it_leads():
+    """With those of where it starts it may leave a sharp crest along their tangent planes."""
+    thin = samples.solid_torus(1500, R=3.0, r=1.0)
+    surface = thin.surface
+    crest = sm.TriMesh(surface.V * [1.0, 1.0, 0.3], surface.F)
+    H, V = a_grid(0.0)
+    turn = 0.1 * np.sin(3.0 * V[:, :1])  # round the axis: points glide
+    V = V * [1.0, 1.0, 0.3] + turn * np.stack([-V[:, 1], V[:, 0], 0.0 * V[:, 0]], axis=1)
+    optimizer = GridOptimizer(np.ascontiguousarray(V), H, crest)
+    assert optimizer._untangle(20, None)
+    corner = _core.volume.EnergyWeights(1.0, 0.1, 0.0)
+    for _ in range(6):
+        optimizer._prepare(2.0, 6.0, guard=False)
+        before, points = optimizer._newton.value(optimizer.V, corner, 4.0).energy, optimizer.V
+        optimizer._advance(4.0, 2.0, 6.0)
+        optimizer._match(optimizer.V, 2.0, 6.0)
+        after = optimizer._newton.value(optimizer.V, corner, 4.0).energy
+        assert after < before or optimizer.V is points
 
 
 def test_samples_lie_on_both_surfaces():

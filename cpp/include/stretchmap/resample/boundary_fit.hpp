@@ -1,6 +1,6 @@
 // How far the boundary of a hexahedral grid is from a surface, as a sum over samples.
 //
-//   E(x) = sum_j c_j g(n_j . (sum_i w_ji x_i - y_j))
+//   E(x) = sum_j c_j g(n_j . (sum_i w_ji x_i - y_j) + inward)
 //
 // over samples j of both: points of each boundary quad against the closest points of the surface,
 // and points of the surface against the closest ones of the grid. n_j is the normal of the surface,
@@ -41,9 +41,8 @@ class BoundaryFit {
               const TetsRef& quads, int per_side, double far);
 
   // \param x points of the grid.
-  // \param inward how far inside the surface the grid's boundary is to lie.
   // \return their samples.
-  FitSamples match(const PointsRef& x, double inward) const;
+  FitSamples match(const PointsRef& x) const;
 
  private:
   Eigen::RowVector3d normal(Index face, const Eigen::Vector3d& weights) const;

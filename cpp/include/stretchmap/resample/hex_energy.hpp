@@ -1,6 +1,7 @@
 // Distortion of a hexahedral grid, and how far its boundary is from a surface.
 //
-//   Psi(x) = sum_h weight_h / 8 sum_t f(psi(J_ht)) + sum_j c_j g(n_j . (sum_i w_ji x_i - y_j)),
+//   Psi(x) = sum_h weight_h / 8 sum_t f(psi(J_ht))
+//            + sum_j c_j g(n_j . (sum_i w_ji x_i - y_j) + inward),
 //   f(psi) = ((1 + psi)^p - 1) / p,     J_ht = [e_1, e_2, e_3] diag(1 / sides),
 //
 // over triples t of edges e_1, e_2, e_3 of each hexahedron, those at its eight corners and, where
@@ -33,6 +34,7 @@ struct HexWeights {
 struct FitNorm {
   double tolerance = 1.0;
   double power = 1.0;
+  double inward = 0.0;  // how far inside the surface the grid's boundary is to lie
 
   double base(double d) const { return 1.0 + d * d / (tolerance * tolerance); }
   double value(double d) const;
