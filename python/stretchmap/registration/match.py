@@ -134,15 +134,23 @@ def match_surfaces(
 def _search(
     problem: SurfaceProblem, y: NDArray[np.float64], step: NDArray[np.float64], energy: float
 ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], float] | None:
-    """Longest of 1, 1/2, ... of the step that lowers the energy."""
-    alpha = 1.0
-    while alpha >= _SHORTEST:
+    """Longest of 1, 1/2, ... of the step that lowers the energy; where few faces would fold, of one
+    that is shortened at these alone, if that is lower."""
+    best, alpha = None, 1.0
+    while alpha >= _SHORTEST and best is None:
         moved = y + alpha * step
+        points, value = problem.place(moved)
+        if value < energy:
+            best, energy = (alpha, moved, points, value), value
+        alpha *= 0.5
+    alpha, least = 1.0, _SHORT if best is None else best[0]
+    while least < alpha:
+        moved = y + problem.unfolded(y, alpha * step)
         points, value = problem.place(moved)
         if value < energy:
             return alpha, moved, points, value
         alpha *= 0.5
-    return None
+    return best
 
 
 def _moved_one_by_one(

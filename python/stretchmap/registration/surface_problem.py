@@ -19,6 +19,7 @@ from .flat_torus import FlatSurface, damped_solve
 __all__ = ["SurfaceProblem"]
 
 _NO_SLOPES = np.zeros((0, 6))
+_PASSES, _LEFT = 12, 0.1  # a step leaves a face this share of its area in the flat torus
 _SWEEPS = 2
 _REACH = 0.25  # of the mean edge at a vertex: first try of its own step
 
@@ -79,6 +80,18 @@ class SurfaceProblem:
         pull = gradient if wish is None else hessian @ step
         step[free] = damped_solve(pull[free], hessian[free][:, free])
         return step.reshape(-1, 2)
+
+    def unfolded(self, y: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The step (n, 2), shortened at the corners of faces that it would fold or nearly so."""
+        before, share = _core.area.turn_areas(self.chart, y), np.ones(len(y))
+        for _ in range(_PASSES):
+            taken = share[:, None] * step
+            areas = _core.area.turn_areas(self.chart, y + taken)
+            folded = np.flatnonzero(areas < _LEFT * before)
+            if not len(folded):
+                break
+            share[np.unique(self.chart.faces[folded])] *= 0.5
+        return taken
 
     def one_by_one(
         self, y: NDArray[np.float64], points: NDArray[np.float64]

@@ -28,6 +28,7 @@ _TRIES, _RELEASES = 4, 2
 _MOST_PAIRS = 10_000
 # What is amiss far apart is mended by moving all between, which a coarse solve hardly sees.
 _CG_TOL = 0.01
+_TOL = 5e-4  # and takes many steps that gain little each
 # Weight of the volume term to begin with. Where volumes have far to go, shape leads the boundary
 # there; volumes alone drive it into the nearest jam.
 _START = 0.2
@@ -52,7 +53,9 @@ def glide_on_mesh(
     Minimized or None
         As certifiable as what was given; None if the boundary crosses itself, whatever is held.
     """
-    options = dataclasses.replace(options, cg_tol=min(options.cg_tol, _CG_TOL))
+    options = dataclasses.replace(
+        options, cg_tol=min(options.cg_tol, _CG_TOL), glide_tol=min(options.glide_tol, _TOL)
+    )
     x, first = problem.x, min(options.frozen_weight, _START)
     held, found = _folded(problem, options, x), None
     tries = releases = 0

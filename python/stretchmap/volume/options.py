@@ -48,7 +48,8 @@ class FillOptions:
         At the largest lambda: stop when a step lowers the energy by no more than this share.
     frozen_weight, face_weight, glide_iter, glide_tol
         Where the boundary glides: lambda at which that starts (on a mesh at 0.2 at most), weight
-        of the boundary triangles' barrier, most steps and the share at which to stop.
+        of the boundary triangles' barrier, most steps and the share at which to stop (on a mesh at
+        5e-4 at most).
     glide_std, glide_distortion : float
         SD of the ratios (6.5) round vertices, and total distortion (6.4), that are enough of a
         boundary that glides on a mesh: when both are met it stops, for the farther vertices glide

@@ -26,6 +26,7 @@ from stretchmap.registration.landmarks import Landmarks, read_landmarks
 from stretchmap.registration.map import register
 from stretchmap.registration.overlay import overlay_splits
 from stretchmap.registration.suggest import landmarks_between
+from stretchmap.registration.surface_problem import SurfaceProblem
 
 RNG = np.random.default_rng(8)
 
@@ -248,6 +249,20 @@ def test_cover_derivatives_match_finite_differences():
     ]
     slope = (difference[0] - difference[1]) / 2e-7
     assert slope == pytest.approx(gradient @ direction.ravel(), rel=1e-5)
+
+
+def test_a_step_is_shortened_only_where_faces_would_fold():
+    flat = FlatSurface.of(samples.torus_surface(24, 12))
+    problem = SurfaceProblem(flat, flat)
+    step = np.full_like(flat.turns, 0.01)
+    step[40] = 0.3, -0.2
+    assert _core.area.turn_areas(flat.chart, flat.turns + step).min() < 0.0
+    taken = problem.unfolded(flat.turns, step)
+    areas = _core.area.turn_areas(flat.chart, flat.turns)
+    assert (_core.area.turn_areas(flat.chart, flat.turns + taken) > 0.05 * areas).all()
+    near = np.unique(flat.surface.F[(flat.surface.F == 40).any(axis=1)])
+    others = np.setdiff1d(np.arange(len(step)), near)
+    assert np.array_equal(taken[others], step[others]) and np.abs(taken[40]).max() > 0.0
 
 
 @pytest.mark.parametrize("seed", [5, 23])
