@@ -53,3 +53,37 @@ def test_newton_steps_reach_a_critical_point(glide):
     for _ in range(60):
         moved, report = newton.step(moved, w, _core.volume.NewtonOptions(tol=1e-8, max_cg=2000))
     assert report.decrement < 1e-9 * report.before.energy
+
+
+def test_a_step_knows_the_energy_where_it_begins():
+    """Whether it begins where the last one ended, elsewhere, with other weights or targets."""
+    from stretchmap import samples
+
+    solid = samples.solid_torus(600)
+    V, T, n = solid.V / solid.volume ** (1 / 3), solid.T, len(solid.V)
+    motion = np.zeros(n, np.uint8)
+    motion[solid.boundary_vertices] = 1
+    newton = _core.volume.SolidNewton(
+        V,
+        tets=T,
+        rest=_core.volume.rest_matrices(V, T, 6.0),
+        weights=solid.tet_volumes / solid.volume,
+        motion=motion,
+    )
+    x = V.copy()
+    x[motion == 0] += 0.002 * RNG.standard_normal(((motion == 0).sum(), 3))
+    options = _core.volume.NewtonOptions(tol=0.1, max_cg=100)
+    shifted = lambda x: x + 1e-3 * np.sin(x) * (motion == 0)[:, None]  # noqa: E731
+    targets = 1.0 + 0.1 * RNG.random(len(T))
+    for weight, change, target in [
+        (3.0, None, None), (3.0, None, None), (9.0, None, None), (9.0, shifted, None),
+        (9.0, None, targets), (9.0, None, None),
+    ]:  # fmt: skip
+        x = x if change is None else change(x)
+        if target is not None:
+            newton.set_targets(target)
+        w = _core.volume.EnergyWeights(1.0, weight, 0.0, 0.0)
+        expected = newton.value(x, w).energy
+        x, report = newton.step(x, w, options)
+        assert report.before.energy == expected
+        assert report.after.energy == newton.value(x, w).energy < expected
