@@ -96,13 +96,13 @@ if TYPE_CHECKING:
     from .resample.hexes import hex_mesh as hex_mesh
     from .volume.fill import FillMap as FillMap
     from .volume.fill import fill as fill
-    from .volume.map import VolumeMap as VolumeMap
     from .volume.map import volume_map as volume_map
     from .volume.options import FillOptions as FillOptions
     from .volume.options import VolumeOptions as VolumeOptions
     from .volume.origin import Origin as Origin
     from .volume.origin import origin_of as origin_of
     from .volume.own import Optimizer as Optimizer
+    from .volume.result import VolumeMap as VolumeMap
 
 _EXPORTS = {
     "Torus": "base.torus",
@@ -151,7 +151,7 @@ _EXPORTS = {
     "FillMap": "volume.fill",
     "FillOptions": "volume.options",
     "fill": "volume.fill",
-    "VolumeMap": "volume.map",
+    "VolumeMap": "volume.result",
     "Origin": "volume.origin",
     "origin_of": "volume.origin",
     "VolumeOptions": "volume.options",

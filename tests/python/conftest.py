@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from stretchmap.mesh.meshes import TetMesh, TriMesh
-from stretchmap.volume import model
+from stretchmap.volume import budget
 
 _ROOT = Path(__file__).resolve().parents[2]
 _MESHES = Path(os.environ.get("STRETCHMAP_MESHES", _ROOT.parent / "shared" / "meshes"))
@@ -68,7 +68,7 @@ def limits_are_those_of_a_plain_build() -> Iterator[None]:
     slowdown = float(os.environ.get("STRETCHMAP_SLOWDOWN", "1"))
     with pytest.MonkeyPatch.context() as patch:
         for name in ("_LEAST_SECONDS", "_MARGIN"):
-            patch.setattr(model, name, slowdown * getattr(model, name))
+            patch.setattr(budget, name, slowdown * getattr(budget, name))
         yield
 
 

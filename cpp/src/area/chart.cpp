@@ -75,7 +75,8 @@ Vec equal_area_from_angle(const VecRef& v, double tube_ratio) {
 
 Vec angle_from_equal_area(const VecRef& s, double tube_ratio) {
   Vec v(s.size());
-  for (Index i = 0; i < s.size(); ++i) {
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < static_cast<Index>(s.size()); ++i) {
     const double whole = kTwoPi * std::round(s(i) / kTwoPi);
     const double t = s(i) - whole;  // in [-pi, pi], and so is the solution
     double low = -0.5 * kTwoPi, high = 0.5 * kTwoPi, x = t / (1.0 + tube_ratio);

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.tables import HasSummary, plain_dict, table
+from ..errors import CertificationError
 
 MOST_IDS = 1000
 
 
-__all__ = ["Certificate"]
+__all__ = ["Certificate", "require_certified"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,4 +94,20 @@ class Findings:
             checks=self.checks,
             quantities=self.quantities,
             ids=self.ids,
+        )
+
+
+def require_certified(certificate: Certificate, what: str) -> None:
+    """Refuse what is not proven to be a bijection.
+
+    Raises
+    ------
+    CertificationError
+        With the reason, and in ``ids`` the elements at fault.
+    """
+    if not certificate.certified:
+        raise CertificationError(
+            f"{what} is not certified: {certificate.reason}; keep_best=True returns it all the "
+            "same",
+            next(iter(certificate.ids.values()), ()),
         )

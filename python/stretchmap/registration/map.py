@@ -23,7 +23,7 @@ from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..certificate.checks import certify
-from ..certificate.findings import Certificate
+from ..certificate.findings import Certificate, require_certified
 from ..errors import ArrayError, CertificationError, SolverError
 from ..maps.history import IterationRecord
 from ..maps.result import MapResult
@@ -31,7 +31,7 @@ from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
 from ..mesh.split_edges import SplitSolid
-from ..volume.engine import require_certified, solve
+from ..volume.engine import solve
 from ..volume.options import FillOptions
 from ..volume.problem import VolumeProblem
 from .affine import affine_landmark_map

@@ -20,20 +20,19 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress
 from ..certificate.checks import certify
-from ..certificate.findings import Certificate
-from ..errors import CertificationError
 from ..mesh.refinement import crowded_edges
+from .budget import Budget
 from .equalize import equalize
 from .exact_rings import make_rings_exact
 from .ground import glide_on_mesh, untangle_on_mesh
 from .minimize import minimize
-from .model import Budget, History
+from .model import History
 from .options import FillOptions, VolumeOptions
 from .problem import Outcome, VolumeProblem
 from .start import started
 from .untangle import folded_faces, stuck_tets, untangle_patches, untangle_whole
 
-__all__ = ["require_certified", "solve"]
+__all__ = ["solve"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -306,19 +305,3 @@ def _glided_on_mesh(run: _Run) -> Outcome:
     run.x = done.x
     outcome = _outcome(run, done.converged, done.reason)
     return dataclasses.replace(outcome, glided=glided)
-
-
-def require_certified(certificate: Certificate, what: str) -> None:
-    """Refuse what is not proven to be a bijection.
-
-    Raises
-    ------
-    CertificationError
-        With the reason, and in ``ids`` the elements at fault.
-    """
-    if not certificate.certified:
-        raise CertificationError(
-            f"{what} is not certified: {certificate.reason}; keep_best=True returns it all the "
-            "same",
-            next(iter(certificate.ids.values()), ()),
-        )

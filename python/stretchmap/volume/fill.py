@@ -16,13 +16,13 @@ from ..base.options import callback, flag, instance
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..certificate.checks import certify
-from ..certificate.findings import Certificate
+from ..certificate.findings import Certificate, require_certified
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..maps.result import MapResult
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
-from .engine import require_certified, solve
+from .engine import solve
 from .options import FillOptions
 from .problem import Outcome, VolumeProblem
 

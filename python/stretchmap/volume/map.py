@@ -6,37 +6,33 @@ import dataclasses
 import logging
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
 from ..area.map import area_map
 from ..area.result import AreaMap
-from ..base.arrays import read_only
-from ..base.options import callback, flag, instance, one_of, real, whole
+from ..base.options import callback, flag, instance
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import Torus
-from ..certificate.checks import certify
-from ..certificate.findings import Certificate
+from ..certificate.findings import require_certified
 from ..errors import KindError, OptionError
 from ..maps.files import LoadedMap
 from ..maps.result import MapResult
 from ..mesh.given import as_solid, require_same_mesh
 from ..mesh.meshes import TetMesh
-from ..mesh.refinement import Refinement
 from .boundary_starts import boundary_starts
-from .engine import require_certified, solve
-from .model import Budget
-from .options import VolumeOptions, weight_at
+from .budget import Budget
+from .engine import solve
+from .options import VolumeOptions, balanced, check_call
 from .own import Optimizer, run_optimizer
-from .problem import Outcome, VolumeProblem
+from .problem import VolumeProblem
+from .result import VolumeMap, volume_result
 from .vsem import run_vsem
 
-__all__ = ["VolumeMap", "volume_map"]
+__all__ = ["volume_map"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -47,81 +43,6 @@ _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 _LARGE = 1_000_000
 # Share of the time left that untangling may take, from each start.
 _PATIENCE = (0.5, 0.8, 0.8, 1.0)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class VolumeMap(MapResult):
-    """A map of a solid onto the solid torus.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-        The mesh that was mapped: the input, or its refinement (see ``refinement``); the first
-        vertices are those of the input.
-    image : ndarray, shape (n, 3)
-        Image of each vertex. The image has the volume of the source.
-    torus : Torus
-        Boundary vertices lie on it.
-    method : str
-        ``"certified"``, ``"vsem"`` or the name of an optimizer of your own.
-    boundary : str
-        ``"frozen"`` or ``"glide"``; ``"own"`` where the optimizer saw to it.
-    boundary_map : AreaMap or None
-        The boundary map; None if the boundary was prescribed.
-    refinement : Refinement or None
-        How ``mesh`` came from the input, if it was refined.
-    history : tuple of IterationRecord
-        Stages ``"vsem"``, ``"untangle"``, ``"frozen"``, ``"glide"``, ``"equalize"``, ``"exact"``,
-        in that order. ``energy`` is the stretch energy in the first, the distortion energy in the
-        next three, the largest error of a marginal volume in ``"equalize"`` and the largest error
-        of a ring volume in ``"exact"``.
-    distortion : Distortion
-    certificate : Certificate
-        Whether the map is proven to be a bijection, computed independently of the optimisation.
-    converged : bool
-    stop_reason : str
-    seconds : dict
-        Wall-clock time per stage; ``"other starts"``: of those that led nowhere.
-    vertex_exact : bool
-        Whether the ring volumes of all interior vertices were made exact.
-
-    Examples
-    --------
-    >>> import stretchmap as sm
-    >>> result = sm.volume_map(sm.samples.bumpy_torus(1000))
-    >>> u, v, s = result.coordinates().T
-    >>> result.method, result.boundary, result.certificate.certified
-    ('certified', 'glide', True)
-    """
-
-    _title: ClassVar[str] = "volume"
-
-    mesh: TetMesh
-    torus: Torus = field()
-    method: str
-    boundary: str
-    boundary_map: AreaMap | None = field(repr=False)
-    refinement: Refinement | None = field(repr=False)
-    certificate: Certificate
-    vertex_exact: bool = False
-
-    def extra_scalars(self) -> dict[str, Any]:
-        """Method, boundary and what was added to the input mesh."""
-        added = self.refinement
-        certificate = self.certificate
-        return {
-            "certified": certificate.certified,
-            "certificate": certificate.to_dict(),
-            "method": self.method,
-            "boundary": self.boundary,
-            "vertex_exact": self.vertex_exact,
-            "added_vertices": 0 if added is None else added.n_split,
-            "added_tets": 0 if added is None else added.n_added_tets,
-        }
-
-    def extra_arrays(self) -> dict[str, NDArray[Any]]:
-        """``parent_tet`` (k,), the input tet of each tet, if the mesh was refined."""
-        return {} if self.refinement is None else {"parent_tet": self.refinement.parent_tet}
 
 
 @takes_threads
@@ -240,9 +161,9 @@ def volume_map(
     if method is None:
         method = "certified" if c is None else "vsem"
     options = VolumeOptions() if options is None else options
-    _check_options(method, boundary, c, max_iter, options)
+    check_call(method, boundary, c, max_iter, options)
     if balance is not None:
-        options = _balanced(method, balance, options)
+        options = balanced(method, balance, options)
     callback("optimizer", optimizer)
     if optimizer is not None and (method, max_iter, balance) != ("certified", None, None):
         raise OptionError("an optimizer of your own takes no method, c, max_iter or balance")
@@ -295,7 +216,7 @@ def _certified_map(
         outcome = solve(
             problem, options, glide=glide, budget=budget, patience=share, progress=progress
         )
-        found = _result(outcome, "certified", "glide" if glide else "frozen", begin)
+        found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin)
         if best is None or _better(found, best):
             best = found
         if best.certificate.certified or budget.spent:
@@ -322,7 +243,7 @@ def _own_map(
     problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
     outcome = run_optimizer(problem, optimizer, solver=options.solver)
     name = getattr(optimizer, "__name__", type(optimizer).__name__)
-    return _result(outcome, name, "own", start)
+    return volume_result(outcome, name, "own", start)
 
 
 def _paper_map(
@@ -342,7 +263,7 @@ def _paper_map(
     image, torus = _start_of(solid, start)
     problem = VolumeProblem.of(solid, image, torus=torus, refine=None)
     outcome = run_vsem(problem, options, c=c, max_iter=max_iter, progress=progress)
-    result = _result(outcome, "vsem", "frozen", start)
+    result = volume_result(outcome, "vsem", "frozen", start)
     _warn(result)
     return result
 
@@ -361,44 +282,6 @@ def _warn(result: VolumeMap) -> None:
         _log.warning("volume map not converged: %s", result.stop_reason)
     if result.distortion.flips:
         _log.warning("volume map has %d flipped tets", result.distortion.flips)
-
-
-def _check_options(
-    method: str,
-    boundary: str | None,
-    c: float | None,
-    max_iter: int | None,
-    options: VolumeOptions,
-) -> None:
-    one_of("method", method, ("certified", "vsem"))
-    if boundary is not None:
-        one_of("boundary", boundary, ("glide", "frozen"))
-    instance("options", options, VolumeOptions, "stretchmap.VolumeOptions(...)")
-    if method == "vsem" and boundary == "glide":
-        raise OptionError(
-            "Algorithm 5.1 holds the boundary; use method='certified' to let it glide"
-        )
-    if method == "vsem" and options.vertex_exact:
-        raise OptionError("vertex_exact belongs to the certified route; leave c and method out")
-    if method == "certified" and c is not None:
-        raise OptionError("c belongs to Algorithm 5.1; use method='vsem' or leave it out")
-    if c is not None:
-        real("c", c, 0.0)
-    if max_iter is not None:
-        whole("max_iter", max_iter, 0)
-
-
-def _balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOptions:
-    balance = real("balance", balance, 0.0, 1.0)
-    if method == "vsem":
-        raise OptionError("balance belongs to the certified route; leave c and method out")
-    if options.volume_weight != VolumeOptions.volume_weight:
-        raise OptionError("give balance or options.volume_weight, not both")
-    if balance == 1.0:
-        return options
-    return dataclasses.replace(
-        options, volume_weight=weight_at(balance), target_iter=0, shift_iter=0
-    )
 
 
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
@@ -420,40 +303,3 @@ def _refines(mesh: TetMesh, solid: TetMesh) -> bool:
     """Whether a mesh begins with the vertices of the solid and has more, as a refinement does."""
     n = solid.n_vertices
     return mesh.n_vertices > n and bool((mesh.V[:n] == solid.V).all())
-
-
-def _result(
-    outcome: Outcome,
-    method: str,
-    boundary: str,
-    start: MapResult,
-) -> VolumeMap:
-    problem, refinement = outcome.problem, outcome.problem.refinement
-    assert problem.torus is not None
-    volume = float(_core.mesh.tet_volumes(problem.x, problem.solid.T).sum())
-    scale = (problem.solid.volume / volume) ** (1.0 / 3.0)
-    image, torus = problem.x * scale, problem.torus.scaled(scale)
-    clock = time.perf_counter()
-    certificate = certify(problem.solid, image, torus)
-    seconds = {**outcome.seconds, "certificate": time.perf_counter() - clock}
-    converged, stop_reason = outcome.converged, outcome.stop_reason
-    if method == "certified" and converged and not certificate.certified:
-        converged, stop_reason = False, f"{stop_reason}, but {certificate.reason}"
-    boundary_map = start if isinstance(start, AreaMap) else None
-    if boundary_map is not None:
-        seconds = {"boundary": sum(boundary_map.seconds.values()), **seconds}
-    return VolumeMap(
-        mesh=problem.solid,
-        image=read_only(image),
-        torus=torus,
-        method=method,
-        boundary=boundary,
-        boundary_map=boundary_map,
-        refinement=refinement if refinement is not None and refinement.n_split else None,
-        history=outcome.history,
-        certificate=certificate,
-        converged=converged,
-        stop_reason=stop_reason,
-        seconds=seconds,
-        vertex_exact=outcome.vertex_exact,
-    )

@@ -15,12 +15,12 @@ from ..base.progress import Progress, report
 from ..base.torus import Torus
 from ..maps.history import IterationRecord
 from ..mesh.meshes import TriMesh
+from .budget import Budget
 from .options import FillOptions
 
-__all__ = ["Budget", "History", "SolidModel", "face_areas"]
+__all__ = ["History", "SolidModel", "face_areas"]
 
 FREE, FIXED, GLIDING = 0, 1, 2
-_LEAST_SECONDS, _MARGIN = 4.5, 0.9  # a stage under way is ended
 _THICK = 0.02  # share of the mean volume round its vertices that a sliver is given
 _REACH = 8.0  # factor up to which the volume next to a boundary face may be off what it expects
 
@@ -221,33 +221,6 @@ def face_areas(V: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.f
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas: NDArray[np.float64] = 0.5 * np.linalg.norm(normals, axis=1)
     return areas
-
-
-class Budget:
-    """Processor time, of all threads, that may be spent.
-
-    Parameters
-    ----------
-    seconds : float
-    """
-
-    def __init__(self, seconds: float) -> None:
-        self.seconds = seconds
-        self._end = time.process_time() + seconds
-
-    @classmethod
-    def of(cls, options: FillOptions, n_tets: int) -> Budget:
-        """What the options allow for a mesh of that many tets; some seconds for a small one."""
-        return cls(max(_LEAST_SECONDS, _MARGIN * options.time_limit * n_tets))
-
-    def share(self, part: float) -> Budget:
-        """A part of what is left."""
-        return Budget(part * max(self._end - time.process_time(), 0.0))
-
-    @property
-    def spent(self) -> bool:
-        """Whether there is none left."""
-        return time.process_time() >= self._end
 
 
 @dataclass

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 from ..area.search import Ratio
-from ..base.options import SOLVERS, flag, one_of, real, whole
+from ..base.options import SOLVERS, flag, instance, one_of, real, whole
+from ..errors import OptionError
 
-__all__ = ["FillOptions", "VolumeOptions", "weight_at"]
+__all__ = ["FillOptions", "VolumeOptions", "balanced", "check_call", "weight_at"]
 
 
 _LEAST_WEIGHT, _MOST_WEIGHT = 1e-2, 1e4  # of the volume term; beyond them nothing changes
@@ -169,3 +171,43 @@ class VolumeOptions(FillOptions):
             whole(name, getattr(self, name), 0)
         real("marginal_tol", self.marginal_tol, 0.0)
         real("exact_std_factor", self.exact_std_factor, 1.0)
+
+
+def check_call(
+    method: str,
+    boundary: str | None,
+    c: float | None,
+    max_iter: int | None,
+    options: VolumeOptions,
+) -> None:
+    """Whether arguments of `volume_map` go together."""
+    one_of("method", method, ("certified", "vsem"))
+    if boundary is not None:
+        one_of("boundary", boundary, ("glide", "frozen"))
+    instance("options", options, VolumeOptions, "stretchmap.VolumeOptions(...)")
+    if method == "vsem" and boundary == "glide":
+        raise OptionError(
+            "Algorithm 5.1 holds the boundary; use method='certified' to let it glide"
+        )
+    if method == "vsem" and options.vertex_exact:
+        raise OptionError("vertex_exact belongs to the certified route; leave c and method out")
+    if method == "certified" and c is not None:
+        raise OptionError("c belongs to Algorithm 5.1; use method='vsem' or leave it out")
+    if c is not None:
+        real("c", c, 0.0)
+    if max_iter is not None:
+        whole("max_iter", max_iter, 0)
+
+
+def balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOptions:
+    """The options for a setting between pure shape and pure volume."""
+    balance = real("balance", balance, 0.0, 1.0)
+    if method == "vsem":
+        raise OptionError("balance belongs to the certified route; leave c and method out")
+    if options.volume_weight != VolumeOptions.volume_weight:
+        raise OptionError("give balance or options.volume_weight, not both")
+    if balance == 1.0:
+        return options
+    return dataclasses.replace(
+        options, volume_weight=weight_at(balance), target_iter=0, shift_iter=0
+    )

@@ -13,8 +13,9 @@ from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import engine
 from stretchmap.volume import map as volume_module
 from stretchmap.volume.boundary_starts import boundary_starts
+from stretchmap.volume.budget import Budget
 from stretchmap.volume.minimize import minimize
-from stretchmap.volume.model import GLIDING, Budget, History
+from stretchmap.volume.model import GLIDING, History
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import VolumeProblem
 from stretchmap.volume.start import started

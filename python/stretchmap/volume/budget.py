@@ -1,0 +1,38 @@
+"""How long a map may take."""
+
+from __future__ import annotations
+
+import time
+
+from .options import FillOptions
+
+__all__ = ["Budget"]
+
+_LEAST_SECONDS, _MARGIN = 4.5, 0.9  # a stage under way is ended
+
+
+class Budget:
+    """Processor time, of all threads, that may be spent.
+
+    Parameters
+    ----------
+    seconds : float
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._end = time.process_time() + seconds
+
+    @classmethod
+    def of(cls, options: FillOptions, n_tets: int) -> Budget:
+        """What the options allow for a mesh of that many tets; some seconds for a small one."""
+        return cls(max(_LEAST_SECONDS, _MARGIN * options.time_limit * n_tets))
+
+    def share(self, part: float) -> Budget:
+        """A part of what is left."""
+        return Budget(part * max(self._end - time.process_time(), 0.0))
+
+    @property
+    def spent(self) -> bool:
+        """Whether there is none left."""
+        return time.process_time() >= self._end
