@@ -21,18 +21,32 @@ HERE = Path(__file__).parents[1]
 ENTRIES = {entry.name: entry for entry in entry_points.ENTRIES}
 
 
-@pytest.mark.parametrize("name", ENTRIES)
-def test_entry_point_against_every_defect(name):
-    entry = ENTRIES[name]
+@pytest.fixture(scope="module")
+def runs():
+    """Exit code and lines of every entry."""
     process = subprocess.run(
-        [sys.executable, "-X", "faulthandler", str(HERE / "entry_points.py"), name],
+        [sys.executable, "-X", "faulthandler", str(HERE / "entry_points.py"), *ENTRIES],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
-    lines = [json.loads(line) for line in process.stdout.splitlines()]
-    assert process.returncode == 0, f"died at {lines[-1:]}: {process.stderr[-3000:]}"
+    found, lines = {}, []
+    for line in map(json.loads, process.stdout.splitlines()):
+        if "entry" in line:
+            found[line["entry"]] = line["code"], lines
+            lines = []
+        else:
+            lines.append(line)
+    assert found.keys() == ENTRIES.keys(), process.stderr[-3000:]
+    return found, process.stderr
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_entry_point_against_every_defect(name, runs):
+    entry, (found, errors) = ENTRIES[name], runs
+    code, lines = found[name]
+    assert code == 0, f"died at {lines[-1:]}: {errors[-3000:]}"
     outcomes = {line["name"]: line for line in lines if "name" in line}
     assert outcomes["sound"]["error"] is None, outcomes["sound"]
     depth = defect_table.DEPTHS.index(entry.depth)
