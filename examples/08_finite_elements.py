@@ -33,7 +33,7 @@ from skfem.utils import solver_iter_pcg
 import stretchmap as sm
 from stretchmap import plot
 
-solid = sm.samples.bumpy_torus(1_000)
+solid = sm.samples.bumpy_torus(600)
 result = sm.volume_map(solid, balance=0.5)
 
 # %%
@@ -76,7 +76,7 @@ fine = heat(tets.refined(1), ElementTetP2())
 runs = {"tets": [], "hexahedra": []}
 for mesh in (tets, tets.refined(1), tets.refined(2)):
     runs["tets"].append((mesh, *heat(mesh, ElementTetP1())))
-for count in (200, 800, 2_400):
+for count in (200, 600, 1_800):
     grid = sm.hex_mesh(result, n_hexahedra=count)
     assert grid.n_invalid == 0
     mesh = from_meshio(grid.to_meshio())
