@@ -106,7 +106,7 @@ for place, (name, found) in enumerate(runs.items(), 1):
     low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_title(f"{mesh.nelements} {name}")
-    axes.set_box_aspect(high - low)
+    axes.set_box_aspect(high - low, zoom=1.6)
     axes.set_axis_off()
 axes = figure.add_subplot(1, 3, 3)
 for name, found in runs.items():

@@ -67,7 +67,7 @@ def modes(population: Population, count: int = 3) -> Figure:
             _paint(axes, solid, values, view)
             what = f"mode {k + 1}, {deviations:+g} SD" if deviations else "mean"
             axes.set_title(what)
-    _bar(figure, grid, 0.0, most, "way of a point from the mean (unit of the shapes)")
+    _bar(figure, grid, 0.0, most, "way of a point from the mean\n(unit of the shapes)")
     return figure
 
 
@@ -110,7 +110,7 @@ def compactness(population: Population) -> Figure:
         "generalization": measures.generalization.mean(axis=1),
         "specificity": measures.specificity.mean(axis=1),
     }
-    units = ("variance explained (%)", *2 * ("mean distance (unit of the shapes)",))
+    units = ("variance explained (%)", *2 * ("mean distance\n(unit of the shapes)",))
     for axes, (title, values), unit in zip(panels, rows.items(), units, strict=True):
         axes.plot(np.arange(len(values)), values, "o-", color=BLUE, markersize=4)
         axes.set(title=title, xlabel="modes", ylabel=unit)

@@ -52,10 +52,31 @@ def test_every_command_of_the_table_exists(capsys):
                     assert re.search(rf"(^|[\s,]){option}\b", help_text), f"{command} {option}"
 
 
-def test_local_links_lead_somewhere():
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
-        if "://" not in target:
-            assert (ROOT / target).exists(), target
+PAGES = sorted(
+    page.relative_to(ROOT).as_posix()
+    for folder in (".", "bench", "docs", "tests")
+    for page in (ROOT / folder).glob("*.md")
+)
+
+
+def anchors(page):
+    """What the headings of a page are linked by."""
+    headings = re.findall(r"^#+ +(.+)$", page.read_text(encoding="utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_local_links_lead_somewhere(page):
+    text = re.sub(r"```.*?```|`[^`]*`", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.S)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in target or target.startswith("mailto:"):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (ROOT / page).parent / path if path else ROOT / page
+        # The gallery and its like are pages of the site only.
+        assert file.exists() or file.parts[-2] in ("gallery", "tutorials", "api"), target
+        if anchor and file.suffix == ".md":
+            assert anchor in anchors(file), target
 
 
 def test_the_picture_is_small_and_can_be_drawn_again(tmp_path):
