@@ -113,6 +113,7 @@ def compactness(population: Population) -> Figure:
     units = ("variance explained (%)", *2 * ("mean distance\n(unit of the shapes)",))
     for axes, (title, values), unit in zip(panels, rows.items(), units, strict=True):
         axes.plot(np.arange(len(values)), values, "o-", color=BLUE, markersize=4)
+        axes.xaxis.get_major_locator().set_params(integer=True)
         axes.set(title=title, xlabel="modes", ylabel=unit)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
