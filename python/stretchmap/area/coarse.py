@@ -18,6 +18,10 @@ _LEAST_FACES = 20_000  # of a coarser surface
 _MAX_ASPECT = 10.0  # source triangles longer than this are not asked to keep their shape
 
 
+class Folded(Exception):
+    """The map of a coarse surface folds faces of the fine one."""
+
+
 @dataclass(frozen=True)
 class Level:
     """A surface with its flat chart.
@@ -63,14 +67,16 @@ class Level:
         problem = _core.area.GlideProblem(self.chart, self.reference, ratio)
         return _core.area.SurfaceNewton(problem, angles)
 
-    def prolonged(self, angles: NDArray[np.float64], ratio: float) -> NDArray[np.float64] | None:
-        """Angles of this surface from those of the next coarser one, None if that folds faces."""
+    def prolonged(
+        self, coarse: _core.area.CoarseSurface, angles: NDArray[np.float64], ratio: float
+    ) -> NDArray[np.float64]:
+        """Angles of this surface from those of its coarser one, `Folded` if there are none."""
         # Linear in the coordinates of equal area: between the vertices, too, areas are kept.
         u, v = angles.T
         turns = np.column_stack([u, v + np.sin(v) / ratio]) / TWO_PI
-        fine = _core.area.prolong(self.coarse, self.chart, turns)
+        fine = _core.area.prolong(coarse, self.chart, turns)
         if len(fine) == 0:
-            return None
+            raise Folded
         # Coarse shears jump from face to face: fine faces across an edge get areas that are off.
         sem = _core.area.SurfaceSem(self.chart, self.surface.face_areas, self.aspect, fine)
         sem.step()

@@ -156,8 +156,6 @@ def area_map(
     steps = Steps(max_iter, tol, shape_budget if balance == 1.0 else math.inf, balance)
     route = Route(phase, wanted, sem_iter, finish, steps)
     made = follow(route, [finest] if finish == "none" else levels(finest), progress)
-    if made is None:  # a coarse map folds faces of the fine one
-        made = follow(route, [finest], progress)
     angles, phase, ratio = made.angles, made.phase, made.ratio
     history, converged, reason = made.history, made.converged, made.reason
     seconds |= made.seconds

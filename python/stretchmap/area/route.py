@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..base.progress import Progress
 from ..maps.history import IterationRecord
 from .balance import JAMMED, balance_areas
-from .coarse import Level
+from .coarse import Folded, Level
 from .finish import Pace, Steps, finish_areas, unfold_faces
 from .flat import start_angles
 from .search import Ratio, search_phase
@@ -50,8 +50,15 @@ class Made:
         self.history += records if finest else [_of_coarse(record) for record in records]
 
 
-def follow(route: Route, stack: list[Level], progress: Progress | None) -> Made | None:
-    """Angles of the first level, by way of the last; None if they fold on the way up."""
+def follow(route: Route, stack: list[Level], progress: Progress | None) -> Made:
+    """Angles of the first level: by way of the last, or without if they fold on the way up."""
+    try:
+        return _climb(route, stack, progress)
+    except Folded:
+        return _climb(route, [dataclasses.replace(stack[0], coarse=None)], progress)
+
+
+def _climb(route: Route, stack: list[Level], progress: Progress | None) -> Made:
     clock = time.perf_counter()
     turns, found, records = _equal_areas(route, stack[-1], progress)
     phase, ratio, _ = found
@@ -67,10 +74,8 @@ def follow(route: Route, stack: list[Level], progress: Progress | None) -> Made 
         finest = level is stack[0]
         steps = route.steps if finest else route.steps.rough()
         if level.coarse is not None:
-            prolonged = level.prolonged(made.angles, ratio)
-            if prolonged is None:
-                return None
-            made.angles, pace = prolonged, pace.finer()
+            made.angles = level.prolonged(level.coarse, made.angles, ratio)
+            pace = pace.finer()
         newton = level.newton(made.angles, ratio)
         made.add(unfold_faces(newton, progress), finest)
         records, made.converged, made.reason = finish_areas(
