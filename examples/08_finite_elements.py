@@ -33,7 +33,7 @@ from skfem.utils import solver_iter_pcg
 import stretchmap as sm
 from stretchmap import plot
 
-solid = sm.samples.bumpy_torus(600)
+solid = sm.samples.bumpy_torus(1_000)
 result = sm.volume_map(solid, balance=0.5)
 
 # %%
@@ -76,7 +76,7 @@ fine = heat(tets.refined(1), ElementTetP2())
 runs = {"tets": [], "hexahedra": []}
 for mesh in (tets, tets.refined(1), tets.refined(2)):
     runs["tets"].append((mesh, *heat(mesh, ElementTetP1())))
-for count in (200, 600, 1_800):
+for count in (200, 800, 2_400):
     grid = sm.hex_mesh(result, n_hexahedra=count)
     assert grid.n_invalid == 0
     mesh = from_meshio(grid.to_meshio())
@@ -106,11 +106,12 @@ for place, (name, found) in enumerate(runs.items(), 1):
     low, high = mesh.p.min(axis=1), mesh.p.max(axis=1)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_title(f"{mesh.nelements} {name}")
-    axes.set_box_aspect(high - low, zoom=1.6)
+    axes.set_box_aspect(high - low, zoom=1.25)
     axes.set_axis_off()
 axes = figure.add_subplot(1, 3, 3)
 for name, found in runs.items():
     axes.loglog([f[2] for f in found], [abs(f[3] / fine[2] - 1) for f in found], "o-", label=name)
+axes.xaxis.set_minor_formatter("")
 axes.set(xlabel="unknowns", title="error of the energy")
 axes.legend()
 if len(sys.argv) > 1:
