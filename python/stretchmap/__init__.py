@@ -88,9 +88,9 @@ if TYPE_CHECKING:
     from .preparation.report import Preparation as Preparation
     from .registration.landmarks import Landmarks as Landmarks
     from .registration.landmarks import read_landmarks as read_landmarks
-    from .registration.map import Registration as Registration
     from .registration.map import register as register
     from .registration.quality import inverse_consistency as inverse_consistency
+    from .registration.result import Registration as Registration
     from .resample.fields import transfer as transfer
     from .resample.hex_result import HexMesh as HexMesh
     from .resample.hexes import hex_mesh as hex_mesh
@@ -159,7 +159,7 @@ _EXPORTS = {
     "Optimizer": "volume.own",
     "Landmarks": "registration.landmarks",
     "read_landmarks": "registration.landmarks",
-    "Registration": "registration.map",
+    "Registration": "registration.result",
     "register": "registration.map",
     "inverse_consistency": "registration.quality",
     "HexMesh": "resample.hex_result",

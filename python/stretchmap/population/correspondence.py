@@ -17,7 +17,8 @@ from ..errors import MeshError, OptionError, SolverError
 from ..maps.result import MapResult
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh, TriMesh
-from ..registration.map import Registration, register
+from ..registration.map import register
+from ..registration.result import Registration
 from ..volume.fill import FillMap, fill
 from ..volume.options import FillOptions
 from .fitting import Fit, Template, fit_surface

@@ -12,7 +12,7 @@ from .. import _core
 from ..errors import LandmarkError, OptionError
 
 if TYPE_CHECKING:
-    from .map import Registration
+    from .result import Registration
 from .landmarks import Landmarks, similarity
 
 __all__ = ["landmarks_between"]
