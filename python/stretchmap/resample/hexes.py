@@ -19,13 +19,14 @@ from ..base.progress import Progress
 from ..base.torus import Torus
 from ..errors import OptionError, SolverError
 from ..maps.given import as_map_of_solid, torus_of
+from ..mesh.meshes import TriMesh
 from .boundary_layers import thicknesses_of, with_layers
 from .hex_result import HexMesh
 from .layout import Layout, prolongation, swept_layout
 from .optimize import GridOptimizer, Schedule
 from .quality import boundary_distances, boundary_quads
 from .sizes import grid_candidates
-from .start import best_start, pulled_back
+from .start import best_start, equal_axes, pulled_back
 
 if TYPE_CHECKING:
     from ..maps.result import MapResult
@@ -103,7 +104,8 @@ def hex_mesh(
     -----
     Up to three choices of the numbers are begun with; the one whose boundary comes closest to the
     surface in the first rounds is gone on with. A grid of more than 16,000 hexahedra with even
-    numbers is optimized with half the numbers first, then split in eight and finished.
+    numbers is optimized with half the numbers first, then split in eight and finished. Where that
+    fails in the solid as it is, its principal axes are made equally long for the optimization.
 
     References
     ----------
@@ -198,13 +200,23 @@ def _optimized(
     schedule: Schedule,
     progress: Progress | None,
 ) -> NDArray[np.float64]:
-    optimizer = GridOptimizer(V, H, solid.surface)
-    optimizer.run(schedule, progress)
+    surface = solid.surface
+    optimizer = GridOptimizer(V, H, surface)
+    if optimizer.run(schedule, progress):
+        better = optimizer.V
+    else:
+        # Of a solid hundreds of times as long as thick, edges are next to parallel and angles do
+        # not untangle it; what is valid with its axes equal is valid as it is.
+        axes = equal_axes(surface.V)
+        evened = TriMesh(np.ascontiguousarray(surface.V @ axes), surface.F)
+        optimizer = GridOptimizer(np.ascontiguousarray(V @ axes), H, evened)
+        optimizer.run(schedule, progress)
+        better = np.ascontiguousarray(np.linalg.solve(axes, optimizer.V.T).T)
     _require_valid(
-        optimizer.V, H, "try other numbers of sections, block or rings, optimize=False returns the "
+        better, H, "try other numbers of sections, block or rings, optimize=False returns the "
         "grid as it was pulled back",
     )  # fmt: skip
-    return optimizer.V
+    return better
 
 
 def _require_valid(V: NDArray[np.float64], H: NDArray[np.int32], remedy: str) -> None:

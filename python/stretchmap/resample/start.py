@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..maps.result import MapResult
     from ..mesh.meshes import TetMesh
 
-__all__ = ["Start", "best_start", "pulled_back"]
+__all__ = ["Start", "best_start", "equal_axes", "pulled_back"]
 
 _BISECTIONS = 40
 _TRIAL = Schedule(powers=(1.0,) * 4 + (2.0,) * 3)
@@ -81,10 +81,17 @@ def best_start(
             continue
         away = max(boundary_distances(optimizer.V, boundary_quads(start.layout.H), solid.surface))
         if (int(not positive), away) < least:
-            best, least = replace(start, V=optimizer.V), (int(not positive), away)
+            best = replace(start, V=optimizer.V) if positive else start
+            least = (int(not positive), away)
     if best is None:
         raise SolverError(f"no grid could be begun with: {failure}") from failure
     return best
+
+
+def equal_axes(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Symmetric (3, 3) matrix A such that ``points @ A`` are spread alike in all directions."""
+    variances, axes = np.linalg.eigh(np.cov(points.T))
+    return np.asarray(axes / np.sqrt(np.maximum(variances, 1e-12 * variances.max())) @ axes.T)
 
 
 def pulled_back(result: MapResult, numbers: Sequence[int] | NDArray[np.int_]) -> Start:

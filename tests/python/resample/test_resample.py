@@ -93,6 +93,16 @@ def test_a_tangled_grid_is_made_valid(vertebra_map, vertebra_grid):
     assert abs(mesh.volume / vertebra_map.mesh.volume - 1.0) < 0.05
 
 
+def test_grids_of_very_long_solids_are_valid():
+    """Edges next to parallel do not untangle as they are."""
+    found = sm.volume_map(samples.vertebra_like(2000))
+    turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+    long = sm.TetMesh(found.mesh.V @ (turn * np.linalg.det(turn)) * [100.0, 1.0, 1.0], found.mesh.T)
+    mesh = hex_mesh(a_map(long, found.image, found.torus), sections=24, block=2, rings=1)
+    assert mesh.n_pulled_back_invalid > 0 and mesh.n_invalid == 0
+    assert abs(mesh.volume / long.volume - 1.0) < 0.05
+
+
 @pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (60, 3, 2)])
 def test_grids_of_other_sizes_are_valid_too(vertebra_map, sections, block, rings):
     mesh = hex_mesh(vertebra_map, sections=sections, block=block, rings=rings)
