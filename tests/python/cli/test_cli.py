@@ -262,7 +262,7 @@ def test_certify_judges_any_map_file(folder, capsys, solid):
 def test_keep_best_keeps_an_uncertified_map_and_still_exits_1(folder, capsys, monkeypatch):
     from dataclasses import replace
 
-    from stretchmap.volume import map as volume
+    from stretchmap.volume import result as volume
 
     real = volume.certify
 
