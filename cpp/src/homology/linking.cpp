@@ -10,6 +10,23 @@ namespace {
 
 constexpr int kTries = 8;  // directions of projection
 
+// Where the loop cuts a corner, what runs on its left enters the corner's triangle and turns back:
+// over an edge and at once over its twin. Without such pairs, in a circle.
+std::vector<Index> without_turning_back(const mesh::SurfaceTopology& top,
+                                        const std::vector<Index>& crossings) {
+  std::vector<Index> kept;
+  for (const Index h : crossings) {
+    if (!kept.empty() && kept.back() == top.twin[h])
+      kept.pop_back();
+    else
+      kept.push_back(h);
+  }
+  std::size_t ends = 0;
+  while (2 * ends + 1 < kept.size() && kept[ends] == top.twin[kept[kept.size() - 1 - ends]]) ++ends;
+  return {kept.begin() + static_cast<std::ptrdiff_t>(ends),
+          kept.end() - static_cast<std::ptrdiff_t>(ends)};
+}
+
 // The half-edges that the loop on the left of `loop` crosses, each from its left to its right side.
 std::vector<Index> left_crossings(const mesh::SurfaceTopology& top, const Loop& loop) {
   const std::vector<Index> along = loop_halfedges(top, loop);
@@ -23,7 +40,7 @@ std::vector<Index> left_crossings(const mesh::SurfaceTopology& top, const Loop& 
     }
     crossings.insert(crossings.end(), fan.rbegin(), fan.rend());
   }
-  return crossings;
+  return without_turning_back(top, crossings);
 }
 
 // A direction out of the solid at the edge of half-edge h.
