@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["HexMesh", "hex_mesh"]
 
 _MOST = 100_000  # hexahedra in any direction
+_MISSED = 0.02  # of the volume; a grid that misses more is made another way, too
 _BYTES_PER_HEX = 12_000  # at the peak, as measured at 200,000
 _COARSE = 16_000  # hexahedra that are optimized at once
 # Of a grid that was split in eight: smaller quads fit better.
@@ -202,21 +203,29 @@ def _optimized(
 ) -> NDArray[np.float64]:
     surface = solid.surface
     optimizer = GridOptimizer(V, H, surface)
-    if optimizer.run(schedule, progress):
-        better = optimizer.V
-    else:
-        # Of a solid hundreds of times as long as thick, edges are next to parallel and angles do
-        # not untangle it; what is valid with its axes equal is valid as it is.
+    better = optimizer.V if optimizer.run(schedule, progress) else None
+    if better is None or _missed(better, H, surface) > _MISSED:
+        # Of a solid tens of times as long as thick, edges are next to parallel: angles do not
+        # untangle it, or swell it; what is valid with its axes equal is valid as it is.
         axes = equal_axes(surface.V)
         evened = TriMesh(np.ascontiguousarray(surface.V @ axes), surface.F)
         optimizer = GridOptimizer(np.ascontiguousarray(V @ axes), H, evened)
         optimizer.run(schedule, progress)
-        better = np.ascontiguousarray(np.linalg.solve(axes, optimizer.V.T).T)
+        other = np.ascontiguousarray(np.linalg.solve(axes, optimizer.V.T).T)
+        if better is None or _missed(other, H, surface) < _missed(better, H, surface):
+            better = other
     _require_valid(
         better, H, "try other numbers of sections, block or rings, optimize=False returns the "
         "grid as it was pulled back",
     )  # fmt: skip
     return better
+
+
+def _missed(V: NDArray[np.float64], H: NDArray[np.int32], surface: TriMesh) -> float:
+    """Share of the volume that is missing or too much; 1 if a hexahedron is not valid."""
+    if (_core.resample.valid_hexes(V, H) == 0).any():
+        return 1.0
+    return abs(float(_core.resample.hex_volumes(V, H).sum()) / surface.volume - 1.0)
 
 
 def _require_valid(V: NDArray[np.float64], H: NDArray[np.int32], remedy: str) -> None:

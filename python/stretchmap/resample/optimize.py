@@ -41,6 +41,8 @@ _NORM = 2.0  # ... with the power 2 _NORM at least, ...
 _NORM_SHARE = 2.0 / 3.0  # ... in the end with twice this share of that of the shape
 _OFFSET = 0.5  # share by which the error of the volume is made good from round to round ...
 _MOST_OFFSET = 1.0  # ... by a surface moved in or out by this many tolerances at most
+# Times the least gap so far: in needles the shape can win over the fit, and the grid swells.
+_AWAY, _LOST = 1.5, 2.5
 _LOOSER = 0.6  # factor of the fit where it is in the way
 _HALVINGS = 4  # of a round whose steps led away from the surface
 _HARDER = 2.0  # factor of the weight of a hexahedron each time it is found invalid
@@ -124,12 +126,19 @@ class GridOptimizer:
         self._steps = schedule.steps
         if not self._untangle(schedule.untangle, progress):
             return False
-        valid = None
+        valid, least = None, np.inf
         for done, power in enumerate(schedule.powers):
             report(progress, "optimize", done, len(schedule.powers), power=power)
             self._round(power, schedule.fit)
-            if not self._invalid().any():
+            if self._invalid().any():
+                continue
+            gap = max(self._gap(), self._tolerance)
+            least = min(least, gap)
+            if gap <= _AWAY * least:
                 valid = self.V
+            elif gap > _LOST * least and valid is not None:
+                self.V = valid
+                break
         for done in range(_INVALID_ROUNDS):
             invalid = self._invalid()
             report(progress, "validity", done, _INVALID_ROUNDS, invalid=int(invalid.sum()))
@@ -141,6 +150,11 @@ class GridOptimizer:
         if valid is not None and self._invalid().any():
             self.V = valid
         return True
+
+    def _gap(self) -> float:
+        if self._matched is not self.V:
+            self._match(self.V, 1.0, 1.0)
+        return self._largest_gap
 
     def _invalid(self) -> NDArray[np.bool_]:
         return np.asarray(_core.resample.valid_hexes(self.V, self.H) == 0)

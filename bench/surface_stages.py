@@ -1,7 +1,7 @@
 """Stages of surface maps against the number of faces.
 
-    python bench/surfaces.py [CASE ...] [--json docs/data/surfaces.json] [--write]
-    python bench/surfaces.py --draw docs/data/surfaces.json   # the table again, nothing measured
+    python bench/surface_stages.py [CASE ...] [--json docs/data/surfaces.json] [--write]
+    python bench/surface_stages.py --draw docs/data/surfaces.json   # only drawn again
 
 A case is a file of a surface, FILE:K one whose faces are divided into four K times, or a number of
 faces: a bumpy torus whose vertices are moved at random along it. Every case is a process of its own

@@ -19,8 +19,8 @@ ROOT = Path(__file__).resolve().parents[3]
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     monkeypatch.syspath_prepend(str(ROOT / "bench"))
-    yield importlib.import_module("surfaces")
-    for name in ("surfaces", "speed"):
+    yield importlib.import_module("surface_stages")
+    for name in ("surface_stages", "speed"):
         sys.modules.pop(name, None)
 
 
