@@ -3,12 +3,16 @@
 A map to the torus leaves open where its angles begin and which way they run. Either two landmarks
 decide, or the shape: with x the place of a tet in the body, c the body's center of mass and
 
-    M_k(a) = sum vol(t) |x_t - c|^2 exp(i k a_t),
+    M(a) = sum vol(t) |x_t - c|^2 exp(i a_t),
 
-u begins at the phase of M_1(u), the direction round the hole in which the body reaches farthest,
-and v at the phase of M_1(v). Both angles may be reversed together, and nothing else keeps
-orientation: they run so that the imaginary part of the largest of M_2(u), M_2(v) and M_1(2 u - v),
-taken from there, is positive. A body with mirror planes across both leaves that sign open.
+u begins at the phase of M(u), the direction round the hole in which the body reaches farthest,
+and v at the phase of M(v). Both angles may be reversed together, and nothing else keeps
+orientation: they run so that, taken from there, the moment
+
+    sum vol(t) |x_t - c|^2 (sin 2 u_t + sin 2 v_t + sin(2 u_t - v_t))
+
+is positive. It is one sum, not the largest of its terms, for of two of nearly the same size and of
+opposite signs the mesh would decide. A body with mirror planes across both leaves that sign open.
 """
 
 from __future__ import annotations
@@ -39,7 +43,8 @@ class Origin:
     sign : int
         -1: both are reversed.
     sureness : tuple of float
-        By shape: ``|M_1| / M_0`` of u and of v, and the size of the moment that decides the sign.
+        By shape: ``|M|`` of u and of v, and the moment that decides the sign, over
+        ``sum vol(t) |x_t - c|^2``.
         Of a body that looks the same all round they are zero, and the rule means nothing. By
         landmarks: ones.
 
@@ -111,19 +116,20 @@ def origin_of(result: MapResult, landmarks: ArrayLike | None = None) -> Origin:
     known = np.isfinite(u)
     reach = np.where(known, reach, 0.0) / reach[known].sum()
 
-    def moment(angle: NDArray[np.float64], k: int) -> complex:
-        return complex((reach * np.exp(1j * k * np.where(known, angle, 0.0))).sum())
+    def moment(angle: NDArray[np.float64]) -> complex:
+        return complex((reach * np.exp(1j * np.where(known, angle, 0.0))).sum())
 
-    first = moment(u, 1), moment(v, 1)
+    first = moment(u), moment(v)
     begin = [float(np.angle(m)) for m in first]
-    ahead, across = u - begin[0], v - begin[1]
-    odd = max(
-        (moment(ahead, 2).imag, moment(across, 2).imag, moment(2.0 * ahead - across, 1).imag),
-        key=abs,
-    )
+    odd = float(reach @ np.where(known, _odd(u - begin[0], v - begin[1]), 0.0))
     return Origin(
         begin[0], begin[1], 1 if odd >= 0.0 else -1, (abs(first[0]), abs(first[1]), abs(odd))
     )
+
+
+def _odd(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Changes its sign where both angles do."""
+    return np.asarray(np.sin(2.0 * u) + np.sin(2.0 * v) + np.sin(2.0 * u - v))
 
 
 def _by_landmarks(result: MapResult, landmarks: ArrayLike) -> Origin:
