@@ -9,8 +9,7 @@ namespace stretchmap::area {
 
 namespace {
 
-constexpr Index kMostDirect = 30000;  // vertices
-constexpr double kRoughly = 1e-3;     // residual that does for a step of the fixed point
+constexpr double kRoughly = 1e-3;  // residual that does for a step of the fixed point
 
 // The constant is free: row and column of vertex 0 become the identity.
 SparseMatrix pinned(SparseMatrix matrix) {
@@ -49,8 +48,7 @@ SemStep SurfaceSem::step() {
     solver_->matrix() = std::move(matrix);
     solver_->refactor();
   } else {
-    const bool small = matrix.rows() <= kMostDirect;
-    solver_.emplace(std::move(matrix), linalg::SpdOptions{small ? "direct" : "multigrid"});
+    solver_.emplace(std::move(matrix));
   }
   const Points2 product = chart_stretch_product(chart_, areas_, periods_, turns_, turns_);
   Rows right = -product;

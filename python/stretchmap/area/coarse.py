@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,14 +67,13 @@ class Level:
         problem = _core.area.GlideProblem(self.chart, self.reference, ratio)
         return _core.area.SurfaceNewton(problem, angles)
 
-    def prolonged(
-        self, coarse: _core.area.CoarseSurface, angles: NDArray[np.float64], ratio: float
-    ) -> NDArray[np.float64]:
+    def prolonged(self, angles: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
         """Angles of this surface from those of its coarser one, `Folded` if there are none."""
+        assert self.coarse is not None
         # Linear in the coordinates of equal area: between the vertices, too, areas are kept.
         u, v = angles.T
         turns = np.column_stack([u, v + np.sin(v) / ratio]) / TWO_PI
-        fine = _core.area.prolong(coarse, self.chart, turns)
+        fine = _core.area.prolong(self.coarse, self.chart, turns)
         if len(fine) == 0:
             raise Folded
         # Coarse shears jump from face to face: fine faces across an edge get areas that are off.
@@ -94,9 +93,7 @@ def levels(finest: Level) -> list[Level]:
             break  # hardly a vertex can go
         surface = TriMesh(fine.surface.V[coarse.kept], coarse.chart.faces)
         turns = np.ascontiguousarray(fine.turns[coarse.kept])
-        found[-1] = Level(
-            fine.surface, fine.turns, fine.forms, fine.aspect, fine.chart, fine.reference, coarse
-        )
+        found[-1] = replace(fine, coarse=coarse)
         found.append(Level.of(surface, turns, _forms(surface, coarse.chart), fine.aspect))
     return found
 

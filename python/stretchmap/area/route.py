@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 import time
 from dataclasses import dataclass, field
 from typing import Literal
@@ -18,6 +19,8 @@ from .finish import Pace, Steps, finish_areas, unfold_faces
 from .flat import start_angles
 from .search import Ratio, search_phase
 from .sem import minimize_stretch
+
+_log = logging.getLogger("stretchmap")
 
 Finish = Literal["ring", "face", "none"]
 
@@ -55,6 +58,7 @@ def follow(route: Route, stack: list[Level], progress: Progress | None) -> Made:
     try:
         return _climb(route, stack, progress)
     except Folded:
+        _log.info("a coarser surface's map folds faces of this one: mapped without it")
         return _climb(route, [dataclasses.replace(stack[0], coarse=None)], progress)
 
 
@@ -74,7 +78,7 @@ def _climb(route: Route, stack: list[Level], progress: Progress | None) -> Made:
         finest = level is stack[0]
         steps = route.steps if finest else route.steps.rough()
         if level.coarse is not None:
-            made.angles = level.prolonged(level.coarse, made.angles, ratio)
+            made.angles = level.prolonged(made.angles, ratio)
             pace = pace.finer()
         newton = level.newton(made.angles, ratio)
         made.add(unfold_faces(newton, progress), finest)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,6 @@ from ..base.progress import Progress, report
 from ..errors import SolverError
 from ..maps.history import IterationRecord
 from .coarse import Level
-
-if TYPE_CHECKING:
-    pass
 
 _log = logging.getLogger("stretchmap")
 

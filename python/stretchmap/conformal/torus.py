@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.torus import Torus
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["conformal_torus", "tube_angle"]
 
