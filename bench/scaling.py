@@ -12,21 +12,13 @@ to its first step counts with it.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
-from speed import parser_of, write
+from speed_page import METHODS, parser_of, run_worker, save, show
 
-HERE = Path(__file__).resolve().parent
-PACKAGE = HERE.parent / "python"
-METHODS: dict[str, dict[str, Any]] = {
-    "certified": {},
-    "vsem": {"method": "vsem", "c": 10.0, "max_iter": 20},
-}
 LAST = "certificate, result"
 
 
@@ -76,21 +68,6 @@ def worker(case: str, method: str) -> dict[str, Any]:
     }
 
 
-def run(case: str, method: str, threads: int) -> dict[str, Any]:
-    """`worker` in a process of its own."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(PACKAGE),
-        "OMP_NUM_THREADS": str(threads),
-        "OPENBLAS_NUM_THREADS": "1",
-        "OMP_WAIT_POLICY": "passive",
-    }
-    command = [sys.executable, str(Path(__file__).resolve()), "--worker", case, "--method", method]
-    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
-    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return row
-
-
 def table(rows: list[dict[str, Any]]) -> str:
     """A line per stage and case."""
     lines = [
@@ -122,13 +99,12 @@ def main(arguments: list[str] | None = None) -> int:
     if options.draw:
         rows = json.loads(options.draw.read_text())
     else:
-        rows = [run(case, options.method, 2) for case in options.cases]
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(rows, indent=1) + "\n")
-    print(table(rows))
-    if options.write:
-        write("scaling", table(rows))
+        rows = [
+            run_worker(__file__, [case, "--method", options.method], threads=2)
+            for case in options.cases
+        ]
+    save(options.json, rows)
+    show(options, "scaling", table(rows))
     return 0
 
 

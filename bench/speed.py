@@ -15,13 +15,12 @@ import argparse
 import json
 import os
 import platform
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parent
-PAGE = HERE.parent / "docs" / "speed.md"
+from speed_page import HERE, METHODS, PACKAGE, parser_of, run_worker, save, show
+
 MESHES = ("petal_ring_synth_14506", "vertebra_L3_ssm_16420", "rocker_arm_25182", "kitten_21584")
 
 
@@ -65,39 +64,22 @@ def worker(job: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def run(package: Path, job: dict[str, Any], threads: int) -> dict[str, Any]:
-    """`worker` in a process of its own with the package of that folder."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(package),
-        "OMP_NUM_THREADS": str(threads),
-        "OPENBLAS_NUM_THREADS": "1",
-        "OMP_WAIT_POLICY": "passive",
-    }
-    command = [sys.executable, str(Path(__file__).resolve()), "--worker", json.dumps(job)]
-    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
-    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return row
-
-
 def measure(options: argparse.Namespace) -> dict[str, Any]:
     """Rows of all cases, methods and numbers of threads; each build's best of the repeats."""
     builds = {"before": options.before, "after": options.after}
-    methods: dict[str, dict[str, Any]] = {
-        "certified": {},
-        "vsem": {"method": "vsem", "c": 10.0, "max_iter": 20},
-    }
     rows: list[dict[str, Any]] = []
+    machine = {"processor": platform.machine(), "cores": os.cpu_count()}
+    data = {"machine": machine, "labels": options.labels, "rows": rows}
     for case in options.cases:
         file = options.meshes / f"{case}.npz"
         mesh = str(file) if file.exists() else case
         for method in options.methods:
-            job = {"mesh": mesh, "arguments": methods[method]}
+            job = json.dumps({"mesh": mesh, "arguments": METHODS[method]})
             for threads in options.threads:
                 best: dict[str, dict[str, Any]] = {}
                 for _ in range(options.repeat):
                     for name, package in builds.items():
-                        row = run(package, job, threads)
+                        row = run_worker(__file__, [job], threads, package)
                         least = best.setdefault(name, row)
                         if row["processor_seconds"] < least["processor_seconds"]:
                             best[name] = row
@@ -106,17 +88,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
                         {"case": case, "method": method, "threads": threads, "build": name, **row}
                     )
                     print(rows[-1], flush=True)
-                save(options, rows)
-    return save(options, rows)
-
-
-def save(options: argparse.Namespace, rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """All there is so far, in the file if one is asked for."""
-    machine = {"processor": platform.machine(), "cores": os.cpu_count()}
-    data = {"machine": machine, "labels": options.labels, "rows": rows}
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(data, indent=1) + "\n")
+                save(options.json, data)
     return data
 
 
@@ -149,28 +121,11 @@ def table(data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def write(name: str, text: str) -> None:
-    """Put a table between its two marks on the page."""
-    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    head, rest = PAGE.read_text().split(begin)
-    PAGE.write_text(head + begin + "\n\n" + text + "\n\n" + end + rest.split(end)[1])
-
-
-def parser_of(text: str | None) -> argparse.ArgumentParser:
-    """With what all benchmarks with a table on the page take."""
-    parser = argparse.ArgumentParser(description=(text or "").splitlines()[0])
-    parser.add_argument("--json", type=Path, help="where the rows go")
-    parser.add_argument("--draw", type=Path, help="rows to draw the table of, instead of measuring")
-    parser.add_argument("--write", action="store_true", help="put the table on docs/speed.md")
-    parser.add_argument("--worker", help=argparse.SUPPRESS)
-    return parser
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Measure or draw."""
     parser = parser_of(__doc__)
     parser.add_argument("--before", type=Path, help="folder of the package to compare with")
-    parser.add_argument("--after", type=Path, default=HERE.parent / "python")
+    parser.add_argument("--after", type=Path, default=PACKAGE)
     parser.add_argument("--labels", nargs=2, default=("0.1.0", "this version"))
     parser.add_argument("--cases", nargs="+", default=[*MESHES, "100000", "350000"])
     parser.add_argument("--methods", nargs="+", default=["certified", "vsem"])
@@ -188,9 +143,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.draw is None and options.before is None:
         parser.error("--before or --draw is needed")
     data = json.loads(options.draw.read_text()) if options.draw else measure(options)
-    print(table(data))
-    if options.write:
-        write("speed", table(data))
+    show(options, "speed", table(data))
     return 0
 
 

@@ -13,19 +13,15 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from speed import parser_of, write
+from speed_page import parser_of, run_worker, save, show
 
 if TYPE_CHECKING:
     import stretchmap as sm
 
-HERE = Path(__file__).resolve().parent
-PACKAGE = HERE.parent / "python"
 STAGES = ("homology", "conformal", "area")
 CASES = ("25000", "100000", "250000")
 
@@ -111,20 +107,6 @@ def worker(case: str) -> dict[str, Any]:
     }
 
 
-def run(case: str) -> dict[str, Any]:
-    """`worker` in a process of its own."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(PACKAGE),
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-    }
-    command = [sys.executable, str(Path(__file__).resolve()), "--worker", case]
-    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
-    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return row
-
-
 def kind(row: dict[str, Any]) -> str:
     """What cases have in common whose times are compared."""
     return "torus" if row["case"].isdigit() else row["case"].split(":")[0]
@@ -174,14 +156,10 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     rows: list[dict[str, Any]] = json.loads(options.draw.read_text()) if options.draw else []
     for case in () if options.draw else options.cases:
-        rows.append(run(case))
+        rows.append(run_worker(__file__, [case], threads=1))
         print(rows[-1], flush=True)
-        if options.json:
-            options.json.parent.mkdir(parents=True, exist_ok=True)
-            options.json.write_text(json.dumps(rows, indent=1) + "\n")
-    print(table(rows))
-    if options.write:
-        write("surfaces", table(rows))
+        save(options.json, rows)
+    show(options, "surfaces", table(rows))
     return 0
 
 

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[3]
 def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     monkeypatch.syspath_prepend(str(ROOT / "bench"))
     yield importlib.import_module("surface_stages")
-    for name in ("surface_stages", "speed"):
+    for name in ("surface_stages", "speed_page"):
         sys.modules.pop(name, None)
 
 
