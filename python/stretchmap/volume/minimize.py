@@ -1,7 +1,7 @@
 """Least volume distortion without a fold: Newton steps behind a barrier.
 
-With lambda the weight of the volume term and 1 that of the shape term, lambda grows by a fixed
-factor after every step that was not cut short, so shape decides early and volume late. The recorded
+With lambda the weight of the volume term and 1 that of the shape term, lambda grows after every
+step that was not cut short to less than half, so shape decides early and volume late. The recorded
 energy is the energy divided by lambda: it cannot rise, neither in a step nor when lambda grows.
 """
 
@@ -129,7 +129,9 @@ def minimize(
             return Minimized(x, True, "volumes are kept", newton)
         if weight < goal:
             if step.alpha >= 0.5:
-                weight = min(goal, o.growth * weight)
+                # Slower where single tets cut steps short: what is left to shape then is lost.
+                factor = o.growth if step.alpha >= 1.0 else math.sqrt(o.growth)
+                weight = min(goal, factor * weight)
             elif step.alpha == 0.0:
                 return Minimized(
                     x, False, f"no step lowers the energy at lambda = {weight:g}", newton

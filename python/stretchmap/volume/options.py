@@ -35,7 +35,7 @@ class FillOptions:
     volume_weight : float
         Largest weight lambda of the volume term against the shape term.
     growth : float
-        Factor by which lambda grows.
+        Factor by which lambda grows after a whole step; its root after one cut short.
     max_aspect : float
         Source tets with a larger ratio of extreme singular values (relative to a regular tet) are
         slivers: their shape is not asked to be kept. Boundary triangles likewise.
@@ -81,7 +81,7 @@ class FillOptions:
     refine: bool = True
     time_limit: float = 1e-3
     volume_weight: float = _MOST_WEIGHT
-    growth: float = 1.5
+    growth: float = 2.0
     max_aspect: float = 6.0
     floor: float = 0.02
     untangle_iter: int = 400
