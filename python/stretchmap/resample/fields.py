@@ -95,8 +95,11 @@ def transfer(
     per_tet = columns[solid.T].mean(axis=1) if per == "vertex" else columns
     wanted = solid.tet_volumes @ per_tet / solid.volume
     bounds = columns.min(axis=0), columns.max(axis=0)
-    for low, high in ((samples.min(axis=1), samples.max(axis=1)), bounds):
-        means = _shifted(means, target.tet_volumes, wanted, low, high)
+    met = samples.min(axis=1), samples.max(axis=1)
+    missing = np.ones(len(wanted), bool)
+    for low, high in (met, bounds):
+        shifted, left = _shifted(means, target.tet_volumes, wanted, low, high)
+        means, missing = np.where(missing, shifted, means), missing & left
     if conserve == "integral":
         means *= solid.volume / target.volume
     return np.reshape(means * unit, (target.n_tets, *field.shape[1:]))
@@ -134,13 +137,16 @@ def _shifted(
     wanted: NDArray[np.float64],
     low: NDArray[np.float64],
     high: NDArray[np.float64],
-) -> NDArray[np.float64]:
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The means moved towards a bound, all by the same share, until theirs is as wanted.
 
-    At most up to the bound: what is then still missing is left.
+    At most up to the bound, and whether something is missing then: more than rounding, which is
+    not to be spread over tets where the field is zero.
     """
     missing = volumes.sum() * wanted - volumes @ means
     room = np.where(missing > 0.0, high - means, low - means)
     most = volumes @ room
     share = np.divide(missing, most, out=np.zeros_like(missing), where=most != 0.0)
-    return np.asarray(means + np.clip(share, 0.0, 1.0) * room)
+    return np.asarray(means + np.clip(share, 0.0, 1.0) * room), (missing != 0.0) & (
+        (share > 1.0) | (most == 0.0)
+    )

@@ -114,9 +114,10 @@ def test_linear_fields_are_reproduced_to_the_order_of_the_mesh(seed):
 def test_where_a_field_is_zero_all_round_it_stays_zero(registered):
     """The correction is local: a dose stays where it is."""
     solid = registered.mesh
-    field = np.where(solid.V[:, 0] > np.median(solid.V[:, 0]), 1.0, 0.0)
-    out = check(registered, field, "vertex")
-    assert (out == 0.0).mean() > 0.3 and out.min() >= 0.0
+    for share in np.linspace(0.45, 0.55, 40):  # of some, rounding leaves a trifle of the integral
+        field = np.where(solid.V[:, 0] > np.quantile(solid.V[:, 0], share), 1.0, 0.0)
+        out = check(registered, field, "vertex")
+        assert (out == 0.0).mean() > 0.3 and out.min() >= 0.0
 
 
 def test_vector_fields_are_carried_column_by_column(registered):
