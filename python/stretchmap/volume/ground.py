@@ -32,6 +32,7 @@ _TOL = 5e-4  # and takes many steps that gain little each
 # Weight of the volume term to begin with. Where volumes have far to go, shape leads the boundary
 # there; volumes alone drive it into the nearest jam.
 _START = 0.2
+_GOAL = 1e3  # and to end with: what is left to be had is asked for on top, see `GlideTargets`
 _REACHES = (1, 2, 4)  # rings of vertices round inverted tets that may glide
 
 
@@ -54,7 +55,10 @@ def glide_on_mesh(
         As certifiable as what was given; None if the boundary crosses itself, whatever is held.
     """
     options = dataclasses.replace(
-        options, cg_tol=min(options.cg_tol, _CG_TOL), glide_tol=min(options.glide_tol, _TOL)
+        options,
+        cg_tol=min(options.cg_tol, _CG_TOL),
+        glide_tol=min(options.glide_tol, _TOL),
+        volume_weight=min(options.volume_weight, _GOAL),
     )
     x, first = problem.x, min(options.frozen_weight, _START)
     held, found = _folded(problem, options, x), None

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from .glide_targets import GlideTargets
 from .model import History, SolidModel
 from .options import FillOptions
 
 __all__ = ["Minimized", "minimize"]
 
 _SERVED = 0.5  # a shorter step shows that a Hessian is too old
-_DRIFT = 1e-4  # of the volume enclosed, before targets are set anew
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
@@ -100,16 +100,21 @@ def minimize(
     newton = model.newton(x, glide=glide)
     if not glide:
         newton.set_targets(model.targets)
-    weight, sharing, enclosed = start, _Sharing(o.shared), 0.0
+    # From face to face of a mesh the Hessian changes too much to be shared.
+    weight, sharing = start, _Sharing(1 if on_mesh else o.shared)
+    targets = GlideTargets(model) if on_mesh else None
+
+    def ended(x: NDArray[np.float64], converged: bool, reason: str) -> Minimized:
+        best = None if targets is None else targets.best
+        return Minimized(x if best is None else best, converged, reason, newton)
+
     for iteration in range(1, total + 1):
         if history.budget.spent:
-            return Minimized(x, False, "the time limit was reached", newton)
+            return ended(x, False, "the time limit was reached")
         weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
-        if on_mesh:
-            volume = float(_core.mesh.tet_volumes(x, model.T).sum())
-            if abs(volume - enclosed) > _DRIFT:
-                newton.set_targets(model.inflating(volume))
-                enclosed = volume
+        asked = None if targets is None else targets.renewed(x)
+        if asked is not None:
+            newton.set_targets(asked)
         linear = _core.volume.NewtonOptions(
             tol=o.cg_tol,
             max_cg=o.max_cg,
@@ -125,21 +130,24 @@ def minimize(
         predicted = 0.5 * step.decrement / weight
         enough = tolerance * min(before, fair)
         small = max(before - after, predicted) <= enough and not step.negative_curvature
-        if on_mesh and model.kept(x):
-            return Minimized(x, True, "volumes are kept", newton)
+        if targets is not None:
+            if model.kept(x):
+                return Minimized(x, True, "volumes are kept", newton)
+            if weight >= goal and step.alpha >= _SERVED:
+                targets.learn(x)
+            if targets.stalled:
+                return ended(x, True, "volumes are kept as far as can be")
         if weight < goal:
             if step.alpha >= 0.5:
                 # Slower where single tets cut steps short: what is left to shape then is lost.
                 factor = o.growth if step.alpha >= 1.0 else math.sqrt(o.growth)
                 weight = min(goal, factor * weight)
             elif step.alpha == 0.0:
-                return Minimized(
-                    x, False, f"no step lowers the energy at lambda = {weight:g}", newton
-                )
+                return ended(x, False, f"no step lowers the energy at lambda = {weight:g}")
         elif goal < o.volume_weight:
             return Minimized(x, True, "goal reached", newton)  # only a start for the next stage
         elif small and sharing.kept == 0:
-            return Minimized(x, True, "the energy stopped decreasing", newton)
+            return ended(x, True, "the energy stopped decreasing")
         else:
             sharing.update(step.alpha, small)
-    return Minimized(x, False, "most iterations done", newton)
+    return ended(x, False, "most iterations done")

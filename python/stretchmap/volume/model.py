@@ -163,12 +163,20 @@ class SolidModel:
         asked = enclosed + missing * yielding / self._mean(yielding)
         return np.asarray(np.maximum(asked, 0.5 * enclosed))
 
-    def kept(self, x: NDArray[np.float64]) -> bool:
-        """Whether volumes are kept as well as is asked of a boundary that glides on a mesh."""
+    def ring_ratios(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Ratios (6.5) round the vertices: (n,)."""
         volumes = _core.mesh.tet_volumes(x, self.T)
         rings = _core.measures.ring_sums(self.T, volumes / volumes.sum(), len(self.V))
-        spread = float((rings / self.rings).std())
-        moved = 0.25 * float(np.abs(rings - self.rings).sum())
+        return np.asarray(rings / self.rings)
+
+    def misfit(self, x: NDArray[np.float64]) -> tuple[float, float]:
+        """SD of the ratios (6.5) round vertices and total distortion (6.4)."""
+        ratios = self.ring_ratios(x)
+        return float(ratios.std()), 0.25 * float((self.rings * np.abs(ratios - 1.0)).sum())
+
+    def kept(self, x: NDArray[np.float64]) -> bool:
+        """Whether volumes are kept as well as is asked of a boundary that glides on a mesh."""
+        spread, moved = self.misfit(x)
         return spread <= self.options.glide_std and moved <= self.options.glide_distortion
 
     @cached_property
