@@ -101,3 +101,29 @@ def thin_wall(thickness, n_tets=12_000):
     radius = np.hypot(x, y)
     scale = (1.0 + thickness * (radius - 3.0)) / radius
     return TetMesh(np.stack([x * scale, y * scale, z], axis=1), solid.T)
+
+
+def with_branch(solid: TetMesh, rings: int, step: float, across: bool = False) -> TetMesh:
+    """A triangular rod of so many rings, each a step on, on the outermost face.
+
+    Or from the innermost across the hole.
+    """
+    faces = solid.boundary_vertices[solid.surface.F]
+    centers = solid.V[faces].mean(axis=1) * [1.0, 1.0, 0.0]
+    far = np.linalg.norm(centers, axis=1)
+    face = np.argmin(far) if across else np.argmax(far)
+    loop = faces[face]
+    a, b, c = solid.V[loop]
+    axis = -centers[face] if across else np.cross(b - a, c - a)
+    out = step * np.arange(1, rings + 1)[:, None, None] * axis / np.linalg.norm(axis)
+    V = np.vstack([solid.V, (solid.V[loop] + out).reshape(-1, 3)])
+    rows = np.vstack([loop, solid.n_vertices + np.arange(3 * rings).reshape(-1, 3)])
+    low, high = rows[:-1].T, rows[1:].T
+    rod = np.vstack(
+        [
+            np.column_stack([low[0], low[1], low[2], high[0]]),
+            np.column_stack([low[1], low[2], high[0], high[1]]),
+            np.column_stack([low[2], high[0], high[1], high[2]]),
+        ]
+    )
+    return TetMesh(V, np.vstack([solid.T, rod]), orient=True)

@@ -20,8 +20,8 @@ from .coarse import Level
 # Excess of E_S over its bound, the variance of the ratios, up to which (4.5) has done its work.
 JAMMED = 1e-2
 _STEPS = 100
-_SHAPE = 0.1  # weight of the shape term against which the area term grows
-_GROWTH, _MOST_WEIGHT = 4.0, 64.0
+_SHAPE = 0.1  # weight of the shape term, that of the area term being one
+_GROWTH, _MOST_WEIGHT = 4.0, 64.0  # of the area term against it
 _REACH, _MOST_REACH = 4.0, 1e6  # factors of area asked for in one step
 _LONG, _FULL = 0.5, 0.9  # steps that let the weight, the reach grow
 _NEARLY = 0.95  # share of the area within reach from which on the weight grows
@@ -30,15 +30,20 @@ _SETTLED = 0.02  # share of the energy; a step that lowers it by less was the la
 
 
 def balance_areas(
-    level: Level, progress: Progress | None
+    level: Level, shape: float, progress: Progress | None
 ) -> tuple[NDArray[np.float64], list[IterationRecord]]:
-    """Turns (n, 2) with nearly equal area ratios, from the level's; records."""
+    """Turns (n, 2) with nearly equal area ratios, from the level's; records.
+
+    Unless `shape` is zero, the weight of the shape term stays at it, and areas are left as far from
+    equal as that makes them.
+    """
     start = time.perf_counter()
     newton = _core.area.ChartNewton(level.chart, level.reference, level.aspect, level.turns)
     history: list[IterationRecord] = []
-    weight, reach = 1.0, _REACH
+    lightest = shape or _SHAPE / _MOST_WEIGHT
+    shape, reach = shape or _SHAPE, _REACH
     for iteration in range(1, _STEPS + 1):
-        taken = newton.step(1.0, _SHAPE / weight, reach)
+        taken = newton.step(1.0, shape, reach)
         measured = newton.measures()
         history.append(
             IterationRecord(
@@ -58,6 +63,6 @@ def balance_areas(
         if taken.step == 0.0 or (taken.within > 1.0 - 1e-9 and (measured.face_std < _FAIR or done)):
             break
         if taken.step > _LONG and taken.within > _NEARLY:
-            weight = min(weight * _GROWTH, _MOST_WEIGHT)
+            shape = max(shape / _GROWTH, lightest)
         reach = min(2.0 * reach, _MOST_REACH) if taken.step >= _FULL else max(_REACH, 0.5 * reach)
     return newton.turns, history

@@ -22,17 +22,20 @@ from .coarse import Level, levels
 from .finish import Steps, finish_areas, unfold_faces
 from .flat import unfolded_turns
 from .result import AreaMap
-from .route import Finish, Route, follow
+from .route import Finish, Made, Route, follow
 from .search import Ratio
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["Finish", "area_map", "finished"]
+__all__ = ["SHAPES", "Finish", "along", "area_map", "finished"]
 
 _log = logging.getLogger("stretchmap")
 
 _MOST_TURNS = 1e3  # a phase may have
+# Weights of shape in the chart where equal areas leave faces folded: few edges round a branch span
+# so much of the torus then that what lies between two rounds of them is cut off.
+SHAPES = (1.0, 10.0, 100.0, 1e3)
 
 
 @takes_threads
@@ -129,6 +132,9 @@ def area_map(
     A surface of more than 40,000 faces is first mapped with fewer, by removing vertices; a step of
     stretch energy minimisation and a few Newton steps follow on the surface itself.
 
+    Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
+    in the chart, and more until none is; ``stop_reason`` then says so.
+
     Examples
     --------
     >>> import stretchmap as sm
@@ -145,48 +151,73 @@ def area_map(
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     clock = time.perf_counter()
-    seconds: dict[str, float] = {}
     conformal = _start(surface, basis, conformal, progress)
-    clock = _lap(seconds, "conformal", clock)
+    seconds = {"conformal": time.perf_counter() - clock}
+    wanted = ratio if torus is None else torus.ratio
+    steps = Steps(max_iter, tol, shape_budget if balance == 1.0 else math.inf, balance)
+    found = along(
+        Route(phase, wanted, sem_iter, finish, steps), surface, conformal, progress, torus
+    )
+    if not found.converged:
+        _log.warning("area map: %s", found.stop_reason)
+    if finish != "none" and not (found.certificate.certified or keep_best):
+        raise CertificationError(
+            f"the area map is not certified: {found.certificate.reason}; keep_best=True returns it "
+            "all the same",
+            next(iter(found.certificate.ids.values()), ()),
+        )
+    return dataclasses.replace(found, seconds={**seconds, **found.seconds})
 
+
+def along(
+    route: Route,
+    surface: TriMesh,
+    conformal: ConformalMap,
+    progress: Progress | None,
+    torus: Torus | None = None,
+) -> AreaMap:
+    """The map a route leads to, certified or not; by rising weights of shape while it is folded."""
     finest = Level.of(
         surface, unfolded_turns(surface, conformal), conformal.forms, conformal.aspect
     )
-    wanted = ratio if torus is None else torus.ratio
-    steps = Steps(max_iter, tol, shape_budget if balance == 1.0 else math.inf, balance)
-    route = Route(phase, wanted, sem_iter, finish, steps)
-    made = follow(route, [finest] if finish == "none" else levels(finest), progress)
-    angles, phase, ratio = made.angles, made.phase, made.ratio
-    history, converged, reason = made.history, made.converged, made.reason
-    seconds |= made.seconds
-    clock = time.perf_counter()
+    made = follow(route, [finest] if route.finish == "none" else levels(finest), progress)
+    found = _result(surface, conformal, made, torus)
+    for shape in SHAPES:
+        if route.finish == "none" or found.certificate.certified or not _folded(found):
+            break
+        _log.info("%s: once more with weight %g of shape", found.certificate.reason, shape)
+        made = follow(dataclasses.replace(route, shape=shape), [finest], progress)
+        made.reason = f"faces folded where areas alone counted; {made.reason}"
+        other = _result(surface, conformal, made, torus)
+        if other.certificate.certified or _folded(other) < _folded(found):
+            found = other
+    return found
 
-    if torus is None:
-        torus = Torus.from_ratio(ratio, area=surface.area)
-    image = torus.xi(angles[:, 0], angles[:, 1])
-    if not converged:
-        _log.warning("area map: %s", reason)
+
+def _folded(found: AreaMap) -> int:
+    """Faces that look inward or cross each other, at most a thousand or two of each."""
+    ids = found.certificate.ids
+    return sum(len(ids.get(check, ())) for check in ("boundary_oriented", "boundary_embedded"))
+
+
+def _result(surface: TriMesh, conformal: ConformalMap, made: Made, torus: Torus | None) -> AreaMap:
+    clock = time.perf_counter()
+    torus = torus or Torus.from_ratio(made.ratio, area=surface.area)
+    image = torus.xi(made.angles[:, 0], made.angles[:, 1])
     certificate = certify(surface, image, torus)
-    _lap(seconds, "certificate", clock)
-    if finish != "none" and not (certificate.certified or keep_best):
-        raise CertificationError(
-            f"the area map is not certified: {certificate.reason}; keep_best=True returns it all "
-            "the same",
-            next(iter(certificate.ids.values()), ()),
-        )
     return AreaMap(
         mesh=surface,
-        angles=read_only(angles),
+        angles=read_only(made.angles),
         image=read_only(image),
         torus=torus,
-        phase=phase,
-        ratio=ratio,
+        phase=made.phase,
+        ratio=made.ratio,
         forms=conformal.forms,
         certificate=certificate,
-        history=tuple(history),
-        converged=converged,
-        stop_reason=reason,
-        seconds=seconds,
+        history=tuple(made.history),
+        converged=made.converged,
+        stop_reason=made.reason,
+        seconds={**made.seconds, "certificate": time.perf_counter() - clock},
     )
 
 
@@ -255,9 +286,3 @@ def _check_numbers(max_iter: int, tol: float, shape_budget: float, sem_iter: int
     real("shape_budget", shape_budget, 1.0)
     whole("max_iter", max_iter, 0)
     whole("sem_iter", sem_iter, 0)
-
-
-def _lap(seconds: dict[str, float], stage: str, start: float) -> float:
-    now = time.perf_counter()
-    seconds[stage] = now - start
-    return now

@@ -27,13 +27,14 @@ Finish = Literal["ring", "face", "none"]
 
 @dataclass(frozen=True)
 class Route:
-    """What `area_map` was asked for."""
+    """What `area_map` was asked for; `shape` weighs shapes against areas in the chart."""
 
     phase: float | None
     ratio: Ratio | float
     sem_iter: int
     finish: Finish
     steps: Steps
+    shape: float = 0.0
 
 
 @dataclass
@@ -98,11 +99,11 @@ def _equal_areas(
     surface, phase, ratio = level.surface, route.phase, route.ratio
     turns, history = minimize_stretch(level, route.sem_iter, progress)
     found = search_phase(surface, turns, level.aspect, phase, ratio)
-    if route.sem_iter and history[-1].energy > 1.0 + JAMMED:
-        balanced, records = balance_areas(level, progress)
+    if route.shape or (route.sem_iter and history[-1].energy > 1.0 + JAMMED):
+        balanced, records = balance_areas(level, route.shape, progress)
         other = search_phase(surface, balanced, level.aspect, phase, ratio)
         # Where only few places are jammed, areas come at the price of all shapes.
-        if other[-1] < found[-1]:
+        if route.shape or other[-1] < found[-1]:
             return balanced, other, history + records
     return turns, found, history
 

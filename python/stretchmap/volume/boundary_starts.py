@@ -6,9 +6,13 @@ import dataclasses
 import math
 from collections.abc import Iterator
 
-from ..area.map import area_map, finished
+from ..area.finish import Steps
+from ..area.map import SHAPES, along, finished
 from ..area.result import AreaMap
+from ..area.route import Route
+from ..area.search import Ratio
 from ..base.progress import Progress
+from ..conformal.map import conformal_map
 from ..mesh.meshes import TetMesh, TriMesh
 from .anisotropy import unstretching
 from .options import VolumeOptions
@@ -16,6 +20,7 @@ from .options import VolumeOptions
 __all__ = ["boundary_starts"]
 
 _STEPS, _TOL = 100, 0.05
+_SEM_STEPS = 10
 
 
 def boundary_starts(
@@ -45,10 +50,14 @@ def boundary_starts(
     unstretch = unstretching(solid.V, solid.T) if glide else None
     if unstretch is not None:
         surface = TriMesh(surface.V @ unstretch, surface.F)
-    first = area_map(
-        surface, ratio=options.ratio or "search", phase=options.phase, finish="none",
-        keep_best=True, progress=progress,
-    )  # fmt: skip
+    conformal = conformal_map(surface, progress=progress)
+
+    def chart(ratio: Ratio | float, shape: float = 0.0) -> AreaMap:
+        route = Route(options.phase, ratio, _SEM_STEPS, "none", Steps(0, _TOL, math.inf), shape)
+        return along(route, surface, conformal, progress)
+
+    ratio: Ratio | float = options.ratio or "search"
+    first = chart(ratio)
 
     def steps(number: int) -> AreaMap:
         return finished(first, max_iter=number, tol=_TOL, progress=progress)
@@ -59,15 +68,19 @@ def boundary_starts(
         reason = f"{found.stop_reason}, a stretch of the surface undone"
         return dataclasses.replace(found, mesh=solid.surface, converged=False, stop_reason=reason)
 
+    def gentle() -> Iterator[AreaMap]:
+        # A long branch with few edges round it is folded wherever it has its area.
+        maps = (chart(ratio, shape) for shape in SHAPES)
+        found = next((found for found in maps if found.certificate.certified), None)
+        if found is not None:
+            yield of_the_solid(found)
+
     def fatter() -> Iterator[AreaMap]:
         # The torus whose areas fit best can be too thin for what is inside; one halfway, on the
         # scale of log(R / r), to where its hole closes has cured that wherever it was met.
         if options.ratio is not None:
             return
-        found = area_map(
-            surface, ratio=math.sqrt(first.ratio), phase=options.phase, finish="none",
-            keep_best=True, progress=progress,
-        )  # fmt: skip
+        found = chart(math.sqrt(first.ratio))
         if not found.certificate.certified:
             found = finished(found, max_iter=0, tol=_TOL, progress=progress)
         yield of_the_solid(found)
@@ -75,11 +88,16 @@ def boundary_starts(
     if not glide:
         yield steps(_STEPS)
         yield steps(0)
+        for found in gentle():
+            yield finished(found, max_iter=_STEPS, tol=_TOL, progress=progress)
         return
     # Faces that look inward cost the interior more steps than unfolding them beforehand; but where
     # that gets stuck, it leaves needles that no gliding opens again.
     unfolded = first if first.certificate.certified else steps(0)
-    begin = first if unfolded.history[-1].flips else unfolded
+    stuck = unfolded.history[-1].flips > 0
+    if stuck:
+        yield from gentle()
+    begin = first if stuck else unfolded
     yield of_the_solid(begin)
     yield from fatter()
     if unfolded is not begin:

@@ -221,6 +221,8 @@ def _certified_map(
             best = found
         if best.certificate.certified or budget.spent:
             break
+        if not best.certificate.checks.get("source_embedded", True):
+            break  # no start mends the source
         vain = time.perf_counter() - clock
         _log.info("not certified (%s): once more from another start", best.certificate.reason)
     assert best is not None

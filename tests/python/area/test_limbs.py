@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from shapes import with_branch
 from stretchmap import _core
+from stretchmap.area import map as area
 from stretchmap.area.flat import unfolded_turns
-from stretchmap.errors import SolverError
+from stretchmap.errors import CertificationError, SolverError
 
 
 def with_limb(rings: int, step: float = 0.12) -> sm.TriMesh:
@@ -87,3 +89,16 @@ def test_a_stretch_solve_that_breaks_down_ends_there(monkeypatch):
     result = sm.area_map(sm.samples.bumpy_torus(1000).surface)
     assert [h.iteration for h in result.history if h.stage == "sem"] == [0, 1]
     assert result.certificate.certified
+
+
+@pytest.mark.parametrize(("n_tets", "rings"), [(1000, 20), (1000, 24), (4000, 20)])
+def test_areas_give_way_where_they_would_fold_faces(monkeypatch, n_tets, rings):
+    """Three edges round a branch: between two of them, spread over the torus, all is cut off."""
+    surface = with_branch(sm.samples.bumpy_torus(n_tets), rings, 0.5).surface
+    found = sm.area_map(surface)
+    assert found.certificate.certified and not found.converged
+    assert found.stop_reason.startswith("faces folded where areas alone counted")
+    assert found.distortion.element_std < 0.5
+    monkeypatch.setattr(area, "SHAPES", ())
+    with pytest.raises(CertificationError, match="folded"):
+        sm.area_map(surface)

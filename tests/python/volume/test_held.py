@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from shapes import with_branch
 from stretchmap.area.map import finished
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import engine
@@ -109,7 +110,7 @@ def test_the_first_start_has_no_folded_face_if_that_can_be_had(monkeypatch):
     plain = sm.area_map(SOLID.surface, finish="none", ratio="search")
     folded = sm.certify(SOLID.surface, plain.image * [1.0, 1.0, -1.0], plain.torus)
     found = dataclasses.replace(plain, certificate=folded)
-    monkeypatch.setattr(boundary_starts_module, "area_map", lambda *_, **__: found)
+    monkeypatch.setattr(boundary_starts_module, "along", lambda *_: found)
     starts = list(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
     assert [start.certificate.certified for start in starts] == [True, True, True, False]
     assert starts[3] is found
@@ -122,6 +123,24 @@ def test_the_second_start_has_a_fatter_torus_unless_its_ratio_is_given():
     assert second.certificate.certified
     given = boundary_starts(SOLID, VolumeOptions(ratio=3.0), glide=True, progress=None)
     assert {start.torus.ratio for start in given} == {3.0}
+
+
+def test_where_equal_areas_fold_the_first_start_keeps_shapes():
+    solid = with_branch(sm.samples.bumpy_torus(1000), 20, 0.5)
+    starts = boundary_starts(solid, VolumeOptions(), glide=True, progress=None)
+    first, second = next(starts), next(starts)
+    assert first.certificate.certified and not second.certificate.certified
+    assert first.distortion.angle_mean < second.distortion.angle_mean
+    found = sm.volume_map(solid)
+    assert found.certificate.certified and found.distortion.flips == 0
+
+
+def test_a_source_that_meets_itself_is_not_started_again(monkeypatch):
+    tried = failing(monkeypatch, 0)
+    crossing = with_branch(sm.samples.solid_torus(1000), 10, 0.6, across=True)
+    found = sm.volume_map(crossing, keep_best=True)
+    assert len(tried) == 1 and not found.certificate.certified
+    assert found.certificate.reason.startswith("the source surface touches or crosses itself")
 
 
 def test_folded_faces_are_better_than_inverted_tets(problem, monkeypatch):
