@@ -77,8 +77,12 @@ void bind_newton(py::module_& m) {
   py::class_<TorusSurface, GlideSurface, std::shared_ptr<TorusSurface>>(m, "TorusSurface")
       .def(py::init<double, double>(), py::arg("R"), py::arg("r"));
   py::class_<MeshSurface, GlideSurface, std::shared_ptr<MeshSurface>>(m, "MeshSurface")
-      .def(py::init<const PointsRef&, const FacesRef&>(), py::arg("points").noconvert(),
-           py::arg("faces").noconvert(), release_gil());
+      .def(py::init([](const PointsRef& points, const FacesRef& faces, bool smooth) {
+             return std::make_shared<MeshSurface>(points, faces,
+                                                  smooth ? MeshAxes::kSmooth : MeshAxes::kFace);
+           }),
+           py::arg("points").noconvert(), py::arg("faces").noconvert(), py::kw_only(),
+           py::arg("smooth_axes"), release_gil());
   py::class_<GlidingBoundary>(m, "GlidingBoundary")
       .def(py::init([](std::shared_ptr<GlideSurface> surface, Faces faces, Rows rest, Vec weights) {
              return GlidingBoundary{std::move(surface), std::move(faces), std::move(rest),

@@ -57,11 +57,12 @@ Points vertex_normals(const PointsRef& points, const FacesRef& faces) {
 
 }  // namespace
 
-MeshSurface::MeshSurface(const PointsRef& points, const FacesRef& faces)
+MeshSurface::MeshSurface(const PointsRef& points, const FacesRef& faces, MeshAxes axes)
     : tree_(points, faces),
       corners_(corners_at(faces, static_cast<Index>(points.rows()))),
       normals_(vertex_normals(points, faces)),
-      face_normals_(mesh::face_area_vectors(points, faces)) {
+      face_normals_(mesh::face_area_vectors(points, faces)),
+      axes_(axes) {
   for (Index f = 0; f < face_normals_.rows(); ++f) area_ += face_normals_.row(f).norm();
   face_normals_.rowwise().normalize();
 }
@@ -100,7 +101,8 @@ Vector3d MeshSurface::outward(const Vector3d& x, Index place) const {
 }
 
 Matrix3d MeshSurface::frame(const Vector3d& x, Index place) const {
-  return axes_of(outward(x, place));
+  if (axes_ == MeshAxes::kSmooth) return axes_of(outward(x, place));
+  return axes_of(face_normals_.row(near(x, place).face).transpose());
 }
 
 Matrix3d MeshSurface::outward_derivative(const Vector3d& x, Index place) const {

@@ -81,7 +81,7 @@ class TorusSurface(GlideSurface):
     def __init__(self, R: typing.SupportsFloat | typing.SupportsIndex, r: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
 class MeshSurface(GlideSurface):
-    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"]) -> None:
+    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], *, smooth_axes: bool) -> None:
         ...
 class GlidingBoundary:
     def __init__(self, *, surface: GlideSurface, faces: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 3]"], rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .minimize import Minimized, minimize
+from .glide_minimize import minimize_on_mesh
+from .minimize import Minimized
 from .model import History
 from .options import FillOptions
 from .problem import VolumeProblem
@@ -65,9 +66,7 @@ def glide_on_mesh(
     tries = releases = 0
     while tries < _TRIES:
         history.model = dataclasses.replace(problem, held=held).model(options)
-        done = minimize(
-            history.model, x, history, glide=True, start=first, goal=options.volume_weight
-        )
+        done = minimize_on_mesh(history.model, x, history, start=first)
         crossing = _crossing(problem, done.x)
         if len(crossing):
             if found is not None:

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .glide_targets import GlideTargets
 from .model import History, SolidModel
 from .options import FillOptions
 
-__all__ = ["Minimized", "minimize"]
+__all__ = ["Minimized", "grown", "minimize"]
 
 _SERVED = 0.5  # a shorter step shows that a Hessian is too old
 _REST = 1  # steps with a Hessian each after one was too old
@@ -69,6 +68,12 @@ class _Sharing:
         self.kept = 0 if renew else (self.kept + 1) % self.shared
 
 
+def grown(weight: float, alpha: float, growth: float, goal: float) -> float:
+    """Lambda after a step of length ``alpha``; slower where single tets cut steps short: what is
+    left to shape then is lost."""
+    return min(goal, (growth if alpha >= 1.0 else math.sqrt(growth)) * weight)
+
+
 def minimize(
     model: SolidModel,
     x: NDArray[np.float64],
@@ -88,33 +93,23 @@ def minimize(
     history : History
         Gets a record per step, of the stage ``"glide"`` or ``"frozen"``.
     glide : bool
-        Whether boundary vertices move on their surface.
+        Whether boundary vertices move on the torus.
     start, goal : float
     """
     o = model.options
     stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
     tolerance = o.glide_tol if glide else o.frozen_tol
-    face, on_mesh = o.face_weight if glide else 0.0, glide and model.ground is not None
-    volumes_alone = glide and not on_mesh and o.volume_weight >= FillOptions.volume_weight
+    face = o.face_weight if glide else 0.0
+    volumes_alone = glide and o.volume_weight >= FillOptions.volume_weight
     fair = _FAIR if volumes_alone else math.inf
     newton = model.newton(x, glide=glide)
     if not glide:
         newton.set_targets(model.targets)
-    # From face to face of a mesh the Hessian changes too much to be shared.
-    weight, sharing = start, _Sharing(1 if on_mesh else o.shared)
-    targets = GlideTargets(model) if on_mesh else None
-
-    def ended(x: NDArray[np.float64], converged: bool, reason: str) -> Minimized:
-        best = None if targets is None else targets.best
-        return Minimized(x if best is None else best, converged, reason, newton)
-
+    weight, sharing = start, _Sharing(o.shared)
     for iteration in range(1, total + 1):
         if history.budget.spent:
-            return ended(x, False, "the time limit was reached")
+            return Minimized(x, False, "the time limit was reached", newton)
         weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
-        asked = None if targets is None else targets.renewed(x)
-        if asked is not None:
-            newton.set_targets(asked)
         linear = _core.volume.NewtonOptions(
             tol=o.cg_tol,
             max_cg=o.max_cg,
@@ -130,24 +125,17 @@ def minimize(
         predicted = 0.5 * step.decrement / weight
         enough = tolerance * min(before, fair)
         small = max(before - after, predicted) <= enough and not step.negative_curvature
-        if targets is not None:
-            if model.kept(x):
-                return Minimized(x, True, "volumes are kept", newton)
-            if weight >= goal and step.alpha >= _SERVED:
-                targets.learn(x)
-            if targets.stalled:
-                return ended(x, True, "volumes are kept as far as can be")
         if weight < goal:
-            if step.alpha >= 0.5:
-                # Slower where single tets cut steps short: what is left to shape then is lost.
-                factor = o.growth if step.alpha >= 1.0 else math.sqrt(o.growth)
-                weight = min(goal, factor * weight)
+            if step.alpha >= _SERVED:
+                weight = grown(weight, step.alpha, o.growth, goal)
             elif step.alpha == 0.0:
-                return ended(x, False, f"no step lowers the energy at lambda = {weight:g}")
+                return Minimized(
+                    x, False, f"no step lowers the energy at lambda = {weight:g}", newton
+                )
         elif goal < o.volume_weight:
             return Minimized(x, True, "goal reached", newton)  # only a start for the next stage
         elif small and sharing.kept == 0:
-            return ended(x, True, "the energy stopped decreasing")
+            return Minimized(x, True, "the energy stopped decreasing", newton)
         else:
             sharing.update(step.alpha, small)
-    return ended(x, False, "most iterations done")
+    return Minimized(x, False, "most iterations done", newton)

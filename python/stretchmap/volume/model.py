@@ -46,6 +46,8 @@ class SolidModel:
     scale : ndarray, shape (n,), or None
         Logarithm of the length an image piece may be expected to have, relative to its source: what
         the boundary image has there, spread inside. None: 0 everywhere.
+    smooth_axes : bool
+        Whether steps on the ground are taken along axes that turn smoothly, or lie in its faces.
     held, pinned : ndarray of intp
         Boundary vertices that stay in place where the others glide: for the time being, for good.
     """
@@ -60,6 +62,7 @@ class SolidModel:
     held: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
     ground: TriMesh | None = None
     pinned: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    smooth_axes: bool = True
 
     @cached_property
     def shares(self) -> NDArray[np.float64]:
@@ -183,7 +186,9 @@ class SolidModel:
     def glide_surface(self) -> _core.volume.GlideSurface:
         """What the boundary may glide on."""
         if self.ground is not None:
-            return _core.volume.MeshSurface(self.ground.V, self.ground.F)
+            return _core.volume.MeshSurface(
+                self.ground.V, self.ground.F, smooth_axes=self.smooth_axes
+            )
         assert self.torus is not None
         return _core.volume.TorusSurface(self.torus.R, self.torus.r)
 

@@ -15,6 +15,7 @@ namespace {
 
 using namespace stretchmap;
 using Eigen::Vector3d;
+using volume::MeshAxes;
 using volume::MeshSurface;
 using volume::TorusSurface;
 
@@ -23,7 +24,7 @@ constexpr double kR = 2.0, kr = 0.7;
 Vector3d on_torus(double u, double v) { return Torus{kR, kr}.point(u, v); }
 
 // `count` points round the tube, twice as many round the axis.
-MeshSurface torus_mesh(Index count) {
+MeshSurface torus_mesh(Index count, MeshAxes axes = MeshAxes::kSmooth) {
   const Index around = 2 * count;
   Points points(around * count, 3);
   Faces faces(2 * around * count, 3);
@@ -36,7 +37,7 @@ MeshSurface torus_mesh(Index count) {
       faces.row(2 * k) << k, right, far;
       faces.row(2 * k + 1) << k, far, up;
     }
-  return MeshSurface(points, faces);
+  return MeshSurface(points, faces, axes);
 }
 
 // The point of the mesh closest to one of the torus.
@@ -95,6 +96,28 @@ TEST_CASE("a step along a mesh stays on it and goes where it goes on the torus")
     CHECK((y - x).norm() == doctest::Approx(0.2).epsilon(0.05));
     CHECK((y - x).normalized().dot(mesh.frame(x, place).leftCols<2>() * step) > 0.19);
   }
+}
+
+TEST_CASE("a step begins along axes in the face, and off smooth ones by as much as these slope") {
+  const MeshSurface smooth = torus_mesh(16), flat = torus_mesh(16, MeshAxes::kFace);
+  double off = 0.0;
+  for (int k = 0; k < 20; ++k) {
+    const Vector3d x = onto(flat, on_torus(0.4 * k + 0.05, 0.9 * k + 0.03));
+    const Index place = flat.place(x);
+    CHECK(flat.outward(x, place) == smooth.outward(x, place));
+    const double slope = smooth.frame(x, place).col(2).cross(flat.frame(x, place).col(2)).norm();
+    for (int c = 0; c < 2; ++c) {
+      const auto begin = [&](const MeshSurface& mesh) -> Vector3d {
+        return tests::slope(
+            [&](double t) { return mesh.moved(x, place, t * Eigen::Vector2d::Unit(c)); }, 1e-6);
+      };
+      CHECK(tests::relative_error(begin(flat), flat.frame(x, place).col(c)) < 1e-8);
+      const double error = (begin(smooth) - smooth.frame(x, place).col(c)).norm();
+      CHECK(error <= 1.001 * slope + 1e-8);
+      off = std::max(off, error);
+    }
+  }
+  CHECK(off > 0.01);
 }
 
 TEST_CASE("the outward direction of a mesh turns as its derivative says") {

@@ -1,8 +1,8 @@
 // A triangle mesh to glide on.
 //
-// Vertices move on its faces. Normals are interpolated between those of its vertices (Phong), so
-// that frames turn as smoothly as on the surface that the mesh stands for; within a face they and
-// the derivatives below are smooth. A place is a face.
+// Vertices move on its faces. Outward directions are interpolated between those of its vertices
+// (Phong), so that they turn as smoothly as on the surface that the mesh stands for; within a face
+// they and the derivatives below are smooth. A place is a face.
 #pragma once
 
 #include "stretchmap/base/incidence.hpp"
@@ -11,11 +11,17 @@
 
 namespace stretchmap::volume {
 
+// What steps are taken along. Smooth axes are perpendicular to the outward direction and lead far
+// over the surface that the mesh stands for; but where the faces slope against it and pressure is
+// high, the energy may rise along them though its gradient says that it falls. Axes in the face are
+// the derivative of `moved`; but they know nothing of the face beyond the next edge.
+enum class MeshAxes { kSmooth, kFace };
+
 class MeshSurface final : public GlideSurface {
  public:
   // \param points,faces (n, 3) and (m, 3), closed and oriented outward, copied.
   // \pre m > 0, no face without area.
-  MeshSurface(const PointsRef& points, const FacesRef& faces);
+  MeshSurface(const PointsRef& points, const FacesRef& faces, MeshAxes axes = MeshAxes::kSmooth);
 
   // \return the face closest to a point.
   Index place(const Eigen::Vector3d& x) const override;
@@ -40,6 +46,7 @@ class MeshSurface final : public GlideSurface {
   Incidence<> corners_;  // at each vertex
   Points normals_;       // (n, 3) of the vertices, by angles
   Points face_normals_;  // (m, 3)
+  MeshAxes axes_;
   double area_ = 0.0;
 };
 

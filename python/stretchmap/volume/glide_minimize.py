@@ -1,0 +1,100 @@
+"""Least volume distortion of a solid whose boundary glides on a mesh.
+
+As in `minimize`, but the energy has kinks at the edges of the mesh. Along smooth axes steps lead
+far, until pressure against a sloping face spoils them; along those of the faces they always lead
+down, but are cut short by kinks. So the other ones are taken after every short step.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .glide_targets import GlideTargets
+from .minimize import Minimized, grown
+from .model import History, SolidModel
+
+__all__ = ["minimize_on_mesh"]
+
+_SHORT = 0.5  # a step that asks for the other axes
+_IDLE = 6  # steps in a row that gain next to nothing
+
+
+class _Minimizers:
+    """One for either kind of axes, the second made when it is needed."""
+
+    def __init__(self, model: SolidModel, x: NDArray[np.float64]) -> None:
+        self.smooth = True
+        self._made = {True: model.newton(x, glide=True)}
+        self._model, self._asked = model, np.empty(0)
+
+    @property
+    def chosen(self) -> _core.volume.SolidNewton:
+        return self._made[self.smooth]
+
+    def ask(self, volumes: NDArray[np.float64]) -> None:
+        self._asked = volumes
+        for newton in self._made.values():
+            newton.set_targets(volumes)
+
+    def switch(self, x: NDArray[np.float64]) -> None:
+        self.smooth = not self.smooth
+        if self.smooth not in self._made:
+            model = dataclasses.replace(self._model, smooth_axes=self.smooth)
+            self._made[self.smooth] = model.newton(x, glide=True)
+            self._made[self.smooth].set_targets(self._asked)
+
+
+def minimize_on_mesh(
+    model: SolidModel, x: NDArray[np.float64], history: History, *, start: float
+) -> Minimized:
+    """Newton steps with lambda growing from ``start`` until volumes are kept as is asked.
+
+    Parameters
+    ----------
+    model : SolidModel
+        With a ``ground``.
+    x : ndarray, shape (n, 3)
+        Without inverted tets and folded boundary faces.
+    history : History
+        Gets a record per step, of the stage ``"glide"``.
+    start : float
+    """
+    o, weight, idle = model.options, start, 0
+    minimizers, targets = _Minimizers(model, x), GlideTargets(model)
+    linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg)
+    reason, converged = "most iterations done", False
+    for iteration in range(1, o.glide_iter + 1):
+        if history.budget.spent:
+            reason = "the time limit was reached"
+            break
+        asked = targets.renewed(x)
+        if asked is not None:
+            minimizers.ask(asked)
+        newton = minimizers.chosen
+        x, step = newton.step(
+            x, _core.volume.EnergyWeights(1.0, weight, 0.0, o.face_weight), linear
+        )
+        before, after = step.before.energy / weight, step.after.energy / weight
+        history.add(
+            "glide", iteration, x, energy=after, step=step.alpha, residual=step.decrement,
+            total=o.glide_iter,
+        )  # fmt: skip
+        if model.kept(x):
+            return Minimized(x, True, "volumes are kept", newton)
+        if step.alpha < _SHORT:
+            minimizers.switch(x)
+        elif weight < o.volume_weight:
+            weight = grown(weight, step.alpha, o.growth, o.volume_weight)
+        else:
+            targets.learn(x)
+        # Both kinds of axes have to agree that nothing is to be gained.
+        idle = idle + 1 if before - after <= o.glide_tol * before else 0
+        if idle >= _IDLE or targets.stalled:
+            reason, converged = "volumes are kept as far as can be", weight == o.volume_weight
+            break
+    best = x if targets.best is None else targets.best
+    return Minimized(best, converged, reason, minimizers.chosen)
