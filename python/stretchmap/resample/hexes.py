@@ -23,8 +23,9 @@ from ..mesh.meshes import TriMesh
 from .boundary_layers import thicknesses_of, with_layers
 from .hex_result import HexMesh
 from .layout import Layout, prolongation, swept_layout
-from .optimize import GridOptimizer, Schedule
-from .quality import boundary_distances, boundary_quads
+from .optimize import GridOptimizer
+from .quality import MOST_MISSED, boundary_distances, boundary_quads, missed_volume
+from .schedule import Schedule
 from .sizes import grid_candidates
 from .start import best_start, equal_axes, pulled_back
 
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 __all__ = ["HexMesh", "hex_mesh"]
 
 _MOST = 100_000  # hexahedra in any direction
-_MISSED = 0.02  # of the volume; a grid that misses more is made another way, too
 _BYTES_PER_HEX = 12_000  # at the peak, as measured at 200,000
 _COARSE = 16_000  # hexahedra that are optimized at once
 # Of a grid that was split in eight: smaller quads fit better.
@@ -103,10 +103,11 @@ def hex_mesh(
 
     Notes
     -----
-    Up to three choices of the numbers are begun with; the one whose boundary comes closest to the
-    surface in the first rounds is gone on with. A grid of more than 16,000 hexahedra with even
-    numbers is optimized with half the numbers first, then split in eight and finished. Where that
-    fails in the solid as it is, its principal axes are made equally long for the optimization.
+    Up to three choices of the numbers are begun with, sizes made even under a loose fit before the
+    boundary is held to the surface; the one whose boundary comes closest is gone on with. A grid of
+    more than 16,000 hexahedra with even numbers is optimized with half the numbers first, then
+    split in eight and finished. Where that fails in the solid as it is, its principal axes are made
+    equally long for the optimization.
 
     References
     ----------
@@ -204,7 +205,7 @@ def _optimized(
     surface = solid.surface
     optimizer = GridOptimizer(V, H, surface)
     better = optimizer.V if optimizer.run(schedule, progress) else None
-    if better is None or _missed(better, H, surface) > _MISSED:
+    if better is None or missed_volume(better, H, surface) > MOST_MISSED:
         # Of a solid tens of times as long as thick, edges are next to parallel: angles do not
         # untangle it, or swell it; what is valid with its axes equal is valid as it is.
         axes = equal_axes(surface.V)
@@ -212,20 +213,13 @@ def _optimized(
         optimizer = GridOptimizer(np.ascontiguousarray(V @ axes), H, evened)
         optimizer.run(schedule, progress)
         other = np.ascontiguousarray(np.linalg.solve(axes, optimizer.V.T).T)
-        if better is None or _missed(other, H, surface) < _missed(better, H, surface):
+        if better is None or missed_volume(other, H, surface) < missed_volume(better, H, surface):
             better = other
     _require_valid(
         better, H, "try other numbers of sections, block or rings, optimize=False returns the "
         "grid as it was pulled back",
     )  # fmt: skip
     return better
-
-
-def _missed(V: NDArray[np.float64], H: NDArray[np.int32], surface: TriMesh) -> float:
-    """Share of the volume that is missing or too much; 1 if a hexahedron is not valid."""
-    if (_core.resample.valid_hexes(V, H) == 0).any():
-        return 1.0
-    return abs(float(_core.resample.hex_volumes(V, H).sum()) / surface.volume - 1.0)
 
 
 def _require_valid(V: NDArray[np.float64], H: NDArray[np.int32], remedy: str) -> None:

@@ -12,8 +12,6 @@ of their edges.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,16 +19,15 @@ from .. import _core
 from ..base.progress import Progress, report
 from ..mesh.meshes import TriMesh
 from .quality import DIRECTIONS, EDGES, boundary_quads, vertex_normals
+from .schedule import ANY_SIZES, EVEN_SIZES, Schedule
+from .sites import surface_sites
 
-__all__ = ["GridOptimizer", "Schedule"]
+__all__ = ["GridOptimizer"]
 
-_VOLUME_WEIGHT = 0.1
 _LARGEST_EPSILON, _LEAST_EPSILON = 0.3, 1e-3
 _RESIDUAL = 0.01  # of their linear systems
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
-_PULL = 0.3  # share of the way to the mean size, in logarithms, that boxes grow or shrink ...
-_MOST_PULL = 0.4  # ... at most by this
 _GUARD = 0.5  # hexahedra whose edge triples are all better are judged by their corners alone
 _PER_SIDE = 3  # samples of a quad, squared, its corners among them
 _FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
@@ -48,36 +45,6 @@ _HALVINGS = 4  # of a round whose steps led away from the surface
 _HARDER = 2.0  # factor of the weight of a hexahedron each time it is found invalid
 _REPAIRS = 10
 _INVALID_ROUNDS = 12
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """How long to go on.
-
-    Attributes
-    ----------
-    untangle : int
-        Most rounds until all corners are positive.
-    fit : float
-        Factor of the fit of the boundary.
-    powers : tuple of float
-        Power p of each round after that, see `hex_energy.hpp`.
-    steps : int
-        Newton steps between two looks at boxes and samples.
-    """
-
-    untangle: int = 40
-    fit: float = 1.0
-    powers: tuple[float, ...] = (
-        *(1.0,) * 6,
-        *(2.0,) * 5,
-        *(3.0,) * 5,
-        *(4.0,) * 5,
-        *(6.0,) * 8,
-        *(8.0,) * 8,
-        *(12.0,) * 10,
-    )
-    steps: int = 3
 
 
 class GridOptimizer:
@@ -104,14 +71,15 @@ class GridOptimizer:
         self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
         self._fit = _core.resample.BoundaryFit(
             surface.V, surface.F, vertex_normals(surface),
-            *_sites(surface, _PER_SIDE**2 * len(quads)), quads, _PER_SIDE, _FAR * self._tolerance,
+            *surface_sites(surface, _PER_SIDE**2 * len(quads)), quads, _PER_SIDE,
+            _FAR * self._tolerance,
         )  # fmt: skip
         self._strength = _FIT * len(quads) / surface.area
         self._area, self._volume, self._inward = surface.area, surface.volume, 0.0
         self._log_size = np.log(_core.resample.hex_volumes(V, H).sum() / len(H)) / 3.0
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
-        self._steps = Schedule.steps
+        self._sizes, self._steps = ANY_SIZES, Schedule.steps
         self._largest_gap = np.inf
         self._matched: NDArray[np.float64] | None = None  # the points of self._samples
 
@@ -126,6 +94,11 @@ class GridOptimizer:
         self._steps = schedule.steps
         if not self._untangle(schedule.untangle, progress):
             return False
+        self._sizes = EVEN_SIZES
+        for done, fit in enumerate(schedule.even):
+            report(progress, "sizes", done, len(schedule.even), fit=fit)
+            self._round(1.0, fit)
+        self._sizes = ANY_SIZES
         valid, least = None, np.inf
         for done, power in enumerate(schedule.powers):
             report(progress, "optimize", done, len(schedule.powers), power=power)
@@ -163,8 +136,8 @@ class GridOptimizer:
         """Whether all edge triples are positive."""
         strength, least = _LOOSE, len(self.H) * 32
         for done in range(rounds + 1):
-            self._prepare(strength, 1.0, pull=0.0)
-            start = self._newton.value(self.V, _corner(1.0))
+            self._prepare(strength, 1.0, drawn=False)
+            start = self._newton.value(self.V, self._corner(1.0))
             report(progress, "untangle", done, rounds, bad=start.flips)
             if start.flips == 0:
                 return True
@@ -205,11 +178,11 @@ class GridOptimizer:
         The samples' tangent planes hold nothing where the surface bends away from them: points that
         glide round a sharp crest leave it, and the round after would send them back.
         """
-        before = self._newton.value(self.V, _corner(0.0), power).energy
-        V, _ = self._newton.run(self.V, _corner(0.0), power, self._steps, tol=_RESIDUAL)
+        before = self._newton.value(self.V, self._corner(0.0), power).energy
+        V, _ = self._newton.run(self.V, self._corner(0.0), power, self._steps, tol=_RESIDUAL)
         for _ in range(_HALVINGS + 1):
             self._match(V, strength, norm)
-            if self._newton.value(V, _corner(0.0), power).energy < before:
+            if self._newton.value(V, self._corner(0.0), power).energy < before:
                 self.V = V
                 return
             V = 0.5 * (self.V + V)
@@ -221,7 +194,7 @@ class GridOptimizer:
         """
         before = self.V
         for done in range(_REPAIRS):
-            self._prepare(_LOOSE * _LOOSER**done, 1.0, pull=0.0)
+            self._prepare(_LOOSE * _LOOSER**done, 1.0, drawn=False)
             min_det = self._min_det()
             if min_det > 0.0:
                 return True
@@ -230,14 +203,14 @@ class GridOptimizer:
         return False
 
     def _min_det(self) -> float:
-        return self._newton.value(self.V, _corner(1.0)).min_det
+        return self._newton.value(self.V, self._corner(1.0)).min_det
 
     def _regularized(self, min_det: float) -> None:
         epsilon = float(np.clip(-0.5 * min_det, _LEAST_EPSILON, _LARGEST_EPSILON))
-        self.V, _ = self._newton.run(self.V, _corner(epsilon), 1.0, Schedule.steps)
+        self.V, _ = self._newton.run(self.V, self._corner(epsilon), 1.0, Schedule.steps)
 
     def _prepare(
-        self, strength: float, norm: float, *, guard: bool = True, pull: float = _PULL
+        self, strength: float, norm: float, *, guard: bool = True, drawn: bool = True
     ) -> None:
         """Boxes and samples of the boundary for the present points.
 
@@ -246,6 +219,7 @@ class GridOptimizer:
         """
         if guard:
             self._guarded |= _core.resample.least_edge_jacobians(self.V, self.H) < _GUARD
+        pull = self._sizes.pull if drawn else 0.0
         self._newton.set_rest(self._sides(_MEAN, pull), self._weights, self._guarded)
         self._match(self.V, strength, norm)
 
@@ -265,7 +239,7 @@ class GridOptimizer:
             means = self._mean_sides()
             logs += mean * (means[:, DIRECTIONS.ravel()] - logs)
             drawn = pull * (self._log_size - means.mean(axis=1))
-            logs += np.clip(drawn, -_MOST_PULL, _MOST_PULL)[:, None]
+            logs += np.clip(drawn, -self._sizes.most, self._sizes.most)[:, None]
         return np.ascontiguousarray(np.exp(logs))
 
     def _mean_sides(self) -> NDArray[np.float64]:
@@ -280,28 +254,5 @@ class GridOptimizer:
             logs = (np.stack(sums, axis=1) / self._counts[:, None])[self.H].mean(axis=1)
         return np.asarray(logs)
 
-
-def _corner(epsilon: float) -> _core.volume.EnergyWeights:
-    return _core.volume.EnergyWeights(1.0, _VOLUME_WEIGHT, epsilon)
-
-
-def _sites(surface: TriMesh, count: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Points spread over the surface, and its vertices, which are where it is farthest out."""
-    faces, weights = _spread(surface, count)
-    used = np.unique(surface.F.ravel(), return_index=True)[1]
-    return (
-        np.concatenate([faces, (used // 3).astype(np.int32)]),
-        np.concatenate([weights, np.eye(3)[used % 3]]),
-    )
-
-
-def _spread(surface: TriMesh, count: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Faces (count,) and weights (count, 3) of points at even steps of area along the faces."""
-    ends = np.cumsum(surface.face_areas)
-    faces = np.searchsorted(ends, (np.arange(count) + 0.5) / count * ends[-1])
-    faces = np.minimum(faces, surface.n_faces - 1)
-    # Inside a face a sequence of low discrepancy (Roberts' R2), folded into the triangle.
-    a, b = (np.arange(1, count + 1)[:, None] * [0.7548776662466927, 0.5698402909980532] % 1.0).T
-    out = a + b > 1.0
-    a, b = np.where(out, 1.0 - a, a), np.where(out, 1.0 - b, b)
-    return faces.astype(np.int32), np.ascontiguousarray(np.stack([1.0 - a - b, a, b], axis=1))
+    def _corner(self, epsilon: float) -> _core.volume.EnergyWeights:
+        return _core.volume.EnergyWeights(1.0, self._sizes.volume, epsilon)

@@ -14,8 +14,9 @@ from ..base.torus import Torus
 from ..errors import SolverError
 from ..maps.given import torus_of
 from .layout import Layout, swept_layout
-from .optimize import GridOptimizer, Schedule
-from .quality import boundary_distances, boundary_quads
+from .optimize import GridOptimizer
+from .quality import MOST_MISSED, boundary_distances, boundary_quads, missed_volume
+from .schedule import Schedule
 
 if TYPE_CHECKING:
     from ..maps.points import PointMap
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Start", "best_start", "equal_axes", "pulled_back"]
 
 _BISECTIONS = 40
-_TRIAL = Schedule(powers=(1.0,) * 4 + (2.0,) * 3)
+_TRIAL = Schedule(even=tuple(np.geomspace(0.01, 1.0, 8)), powers=(1.0,) * 2 + (2.0,) * 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,7 @@ def best_start(
 ) -> Start:
     """The grid whose boundary is the closest to the surface after the first rounds.
 
-    One with hexahedra that are not positive comes after all others. A single candidate is only
+    One that is not valid after them, or has lost the surface, comes after all others, as it was
     pulled back.
 
     Raises
@@ -68,21 +69,21 @@ def best_start(
     SolverError
         No candidate could be pulled back and begun with.
     """
-    if len(candidates) == 1:
-        return pulled_back(result, candidates[0])
     best, least, failure = None, (2, np.inf), None
     for numbers in candidates:
         start = pulled_back(result, numbers)
         optimizer = GridOptimizer(start.V, start.layout.H, solid.surface)
         try:
-            positive = optimizer.run(_TRIAL, progress)
+            optimizer.run(_TRIAL, progress)
         except SolverError as error:
             failure = error
             continue
-        away = max(boundary_distances(optimizer.V, boundary_quads(start.layout.H), solid.surface))
-        if (int(not positive), away) < least:
-            best = replace(start, V=optimizer.V) if positive else start
-            least = (int(not positive), away)
+        H = start.layout.H
+        lost = missed_volume(optimizer.V, H, solid.surface) > MOST_MISSED
+        V = start.V if lost else optimizer.V
+        away = max(boundary_distances(V, boundary_quads(H), solid.surface))
+        if (int(lost), away) < least:
+            best, least = replace(start, V=V), (int(lost), away)
     if best is None:
         raise SolverError(f"no grid could be begun with: {failure}") from failure
     return best

@@ -119,7 +119,7 @@ def test_stages_are_reported(bumpy_map):
         progress=lambda stage, done, total, **values: seen.append((stage, values)),
     )  # fmt: skip
     stages = [stage for stage, _ in seen]
-    assert list(dict.fromkeys(stages)) == ["untangle", "optimize", "validity"]
+    assert list(dict.fromkeys(stages)) == ["untangle", "sizes", "optimize", "validity"]
     assert seen[-1][1] == {"invalid": 0}
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import stretchmap as sm
 from shapes import a_map
+from stretchmap import _core
 from stretchmap.errors import SolverError
 from stretchmap.resample import start as module
-from stretchmap.resample.quality import boundary_distances, boundary_quads
+from stretchmap.resample.optimize import GridOptimizer
+from stretchmap.resample.quality import boundary_distances, boundary_quads, missed_volume
 from stretchmap.resample.sizes import grid_candidates
 from stretchmap.resample.start import best_start, pulled_back
 
@@ -48,6 +52,40 @@ def test_a_candidate_that_breaks_down_is_passed_over(monkeypatch):
     assert best_start(result, solid, [(6, 1, 1), (8, 2, 1)]).numbers == (8, 2, 1)
     with pytest.raises(SolverError, match="no grid could be begun with: broke down"):
         best_start(result, solid, [(6, 1, 1), (6, 1, 1)])
+
+
+def stretched(solid, length):
+    """Along a direction that is none of the axes."""
+    turn = np.linalg.qr(np.random.default_rng(6).standard_normal((3, 3)))[0]
+    axes = turn * np.linalg.det(turn) * [length, 1.0, 1.0]
+    return sm.TetMesh(solid.V @ axes, solid.T)
+
+
+def test_hexahedra_are_even_before_they_fit():
+    """A map leaves bumps to few; fitted at once those stay large."""
+    solid = sm.samples.bumpy_torus(3000)
+    result = sm.volume_map(solid, balance=0.0)
+    start = pulled_back(result, (30, 3, 1))
+    largest = []
+    for schedule in (module._TRIAL, replace(module._TRIAL, even=())):
+        optimizer = GridOptimizer(start.V, start.layout.H, solid.surface)
+        assert optimizer.run(schedule)
+        volumes = _core.resample.hex_volumes(optimizer.V, start.layout.H)
+        largest.append(volumes.max() / volumes.mean())
+    assert largest[0] < 0.8 * largest[1]
+
+
+def test_what_lost_the_surface_is_not_gone_on_with():
+    """In a needle shapes and sizes win over the fit, and the grid swells."""
+    solid = sm.samples.vertebra_like(8000)
+    found = sm.volume_map(solid)
+    long = stretched(solid, 30.0)
+    result = a_map(long, found.image, found.torus)
+    start = best_start(result, long, [(24, 2, 1)])
+    assert np.array_equal(start.V, start.pulled)
+    optimizer = GridOptimizer(start.V, start.layout.H, long.surface)
+    optimizer.run(module._TRIAL)
+    assert missed_volume(optimizer.V, start.layout.H, long.surface) > 0.05
 
 
 def test_candidates_have_about_as_many_hexahedra_as_asked_for():
