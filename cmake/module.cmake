@@ -8,8 +8,9 @@ target_compile_options(_core PRIVATE ${warnings} ${strict})
 if(NOT CMAKE_UNITY_BUILD)
   target_precompile_headers(_core PRIVATE cpp/bindings/arrays.hpp)
 elseif(NOT MSVC)
-  # Two units are read faster than a header is precompiled, and to optimize what only converts would
+  # One unit is read faster than a header is precompiled, and to optimize what only converts would
   # take most of the time of an install.
+  set_target_properties(_core PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
   target_compile_options(_core PRIVATE -O1)
 endif()
 if(STRETCHMAP_INPLACE)

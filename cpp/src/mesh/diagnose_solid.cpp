@@ -102,8 +102,10 @@ void nonmanifold_vertices(const TetsRef& tets, const Mask& skip, Links links,
   for (Index i = 0; i < n_vertices; ++i)
     unsound[i] |= used[i] && links.euler[i] != links.expected[i];
   for (const Index i : report.nonmanifold_vertices) unsound[i] = 1;
-  for (const Index i : report.nonmanifold_edges.reshaped()) unsound[i] = 0;
-  for (const Index i : report.nonmanifold_faces.reshaped()) unsound[i] = 0;
+  for (const auto edge : report.nonmanifold_edges.rowwise())
+    for (const Index i : edge) unsound[i] = 0;
+  for (const auto face : report.nonmanifold_faces.rowwise())
+    for (const Index i : face) unsound[i] = 0;
   report.nonmanifold_vertices = set_entries(unsound);
 }
 

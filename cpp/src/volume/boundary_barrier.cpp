@@ -121,10 +121,12 @@ void BoundaryBarrier::model(const PointsRef& x, const GlideSites& sites, Index f
 Vec least_facing(const GlidingBoundary& boundary, const PointsRef& x) {
   IndexVec number = IndexVec::Constant(x.rows(), -1);
   std::vector<Index> vertices;
-  for (const Index i : boundary.faces.reshaped()) {
-    if (number[i] >= 0) continue;
-    number[i] = static_cast<Index>(vertices.size());
-    vertices.push_back(i);
+  for (int k = 0; k < 3; ++k) {
+    for (const Index i : boundary.faces.col(k)) {
+      if (number[i] >= 0) continue;
+      number[i] = static_cast<Index>(vertices.size());
+      vertices.push_back(i);
+    }
   }
   const GlideSites sites = sites_at(*boundary.surface, x, vertices, number, false);
   const BoundaryBarrier barrier(boundary);
