@@ -25,6 +25,8 @@ html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_title = f"stretchmap {release}"
 html_theme_options = {"navigation_with_keys": False, "show_prev_next": False}
+# Pages by themselves have no section to navigate.
+html_sidebars = {"*": [], "api": ["sidebar-nav-bs"]}
 exclude_patterns = [
     "results.md",
     "release.md",
