@@ -68,9 +68,10 @@ def boundary_starts(
         reason = f"{found.stop_reason}, a stretch of the surface undone"
         return dataclasses.replace(found, mesh=solid.surface, converged=False, stop_reason=reason)
 
-    def gentle() -> Iterator[AreaMap]:
-        # A long branch with few edges round it is folded wherever it has its area.
-        maps = (chart(ratio, shape) for shape in SHAPES)
+    def gentle(ratio: Ratio | float) -> Iterator[AreaMap]:
+        # A long branch with few edges round it is folded wherever it has its area, and of a thin
+        # shell both sides end up far from each other.
+        maps = (chart(ratio, shape) for shape in SHAPES[1:])
         found = next((found for found in maps if found.certificate.certified), None)
         if found is not None:
             yield of_the_solid(found)
@@ -80,28 +81,27 @@ def boundary_starts(
         # scale of log(R / r), to where its hole closes has cured that wherever it was met.
         if options.ratio is not None:
             return
-        found = chart(math.sqrt(first.ratio))
+        ratio = math.sqrt(first.ratio)
+        found = chart(ratio)
         if not found.certificate.certified:
             found = finished(found, max_iter=0, tol=_TOL, progress=progress)
         yield of_the_solid(found)
+        yield from gentle(ratio)
 
     if not glide:
         yield steps(_STEPS)
         yield steps(0)
-        for found in gentle():
+        for found in gentle(ratio):
             yield finished(found, max_iter=_STEPS, tol=_TOL, progress=progress)
         return
     # Faces that look inward cost the interior more steps than unfolding them beforehand; but where
     # that gets stuck, it leaves needles that no gliding opens again.
     unfolded = first if first.certificate.certified else steps(0)
     stuck = unfolded.history[-1].flips > 0
-    if stuck:
-        yield from gentle()
-    begin = first if stuck else unfolded
-    yield of_the_solid(begin)
-    yield from fatter()
-    if unfolded is not begin:
+    if not stuck:
         yield of_the_solid(unfolded)
-    yield of_the_solid(steps(_STEPS))
-    if first is not begin:
+    yield from fatter()
+    yield from gentle(ratio)
+    if first is not unfolded:
         yield of_the_solid(first)
+    yield of_the_solid(steps(_STEPS))
