@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Start", "best_start", "equal_axes", "pulled_back"]
 
 _BISECTIONS = 40
-_TRIAL = Schedule(even=tuple(np.geomspace(0.01, 1.0, 8)), powers=(1.0,) * 2 + (2.0,) * 2)
+_TRIAL = Schedule(even=tuple(np.geomspace(0.003, 1.0, 16)), powers=(1.0,) * 2 + (2.0,) * 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +74,13 @@ def best_start(
         start = pulled_back(result, numbers)
         optimizer = GridOptimizer(start.V, start.layout.H, solid.surface)
         try:
-            optimizer.run(_TRIAL, progress)
+            positive = optimizer.run(_TRIAL, progress)
         except SolverError as error:
             failure = error
             continue
         H = start.layout.H
-        lost = missed_volume(optimizer.V, H, solid.surface) > MOST_MISSED
+        # Of what is tangled throughout, validity takes long to decide.
+        lost = not positive or missed_volume(optimizer.V, H, solid.surface) > MOST_MISSED
         V = start.V if lost else optimizer.V
         away = max(boundary_distances(V, boundary_quads(H), solid.surface))
         if (int(lost), away) < least:
