@@ -20,7 +20,7 @@ from .model import History, SolidModel
 __all__ = ["minimize_on_mesh"]
 
 _SHORT = 0.5  # a step that asks for the other axes
-_IDLE = 6  # steps in a row that gain next to nothing
+_IDLE = 20  # steps in a row that gain next to nothing
 
 
 class _Minimizers:
