@@ -86,9 +86,9 @@ for name, found in runs.items():
         print(f"{mesh.nelements:6d} {name:9s} {unknowns:6d} unknowns  energy {energy:.6g}  "
               f"off by {100 * (energy / fine[2] - 1):+.2f} %")  # fmt: skip
 print(f"reference: {fine[1]} unknowns, second order, energy {fine[2]:.6g}")
+# One per cent is what the reference is good for, whose fibers are those of its elements' centers.
 for found in runs.values():
-    assert abs(found[-1][3] / fine[2] - 1) < 0.5 * abs(found[0][3] / fine[2] - 1)
-    assert abs(found[-1][3] / fine[2] - 1) < 0.05
+    assert abs(found[-1][3] / fine[2] - 1) < 0.01
 
 # %%
 # The temperatures on both, and the energies.
