@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from ..base import options
 from ..base.arrays import as_reals
 from ..base.progress import Progress, report
-from ..errors import GenusError, OptionError, SelfIntersectionError, SolverError
+from ..errors import (
+    ConnectivityError,
+    GenusError,
+    OptionError,
+    SelfIntersectionError,
+    SolverError,
+)
 from ..mesh.given import as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.tetrahedralize import tetrahedralize
@@ -170,7 +176,7 @@ class _Run:
         self.announce("crossings")
         try:
             sound, counts = remove_crossings(surface)
-        except SelfIntersectionError:
+        except (SelfIntersectionError, ConnectivityError):  # or cut in two
             sound = rebuilt(surface, 0.5 * _edge_of(surface, _REBUILT_FACES))
             if len(crossings(sound)) or not sound.diagnose().ok:
                 raise
@@ -201,7 +207,7 @@ class _Run:
                 return smooth, _mean_edge(smooth), True
             try:
                 mended, counts = remove_crossings(smooth)
-            except SelfIntersectionError:
+            except (SelfIntersectionError, ConnectivityError):  # or cut in two
                 break
             removed += counts["removed"]
             if mended.genus != surface.genus:
