@@ -41,8 +41,8 @@ _log = logging.getLogger("stretchmap")
 _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 # Larger runs say beforehand how much they need.
 _LARGE = 1_000_000
-# Share of the time left that untangling may take, from each start.
-_PATIENCE = (0.3, 0.4, 0.5, 0.6, 1.0)
+# Share of the time left that untangling may take, from each start; half of it if that is folded.
+_PATIENCE = (0.3, 0.5, 0.6, 0.6, 1.0)
 
 
 @takes_threads
@@ -213,6 +213,8 @@ def _certified_map(
     for begin, share in zip(starts, patience, strict=False):
         image, torus = _start_of(solid, begin)
         problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
+        if begin is not start and not _unfolded(begin):
+            share *= 0.5
         outcome = solve(
             problem, options, glide=glide, budget=budget, patience=share, progress=progress
         )
@@ -229,6 +231,10 @@ def _certified_map(
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
+
+
+def _unfolded(start: MapResult) -> bool:
+    return isinstance(start, AreaMap) and start.certificate.certified
 
 
 def _own_map(

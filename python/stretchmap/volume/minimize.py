@@ -97,9 +97,11 @@ def minimize(
     start, goal : float
     """
     o = model.options
-    stage, total = ("glide", o.glide_iter) if glide else ("frozen", o.frozen_iter)
-    tolerance = o.glide_tol if glide else o.frozen_tol
-    face = o.face_weight if glide else 0.0
+    stage, total, tolerance, face = (
+        ("glide", o.glide_iter, o.glide_tol, o.face_weight)
+        if glide
+        else ("frozen", o.frozen_iter, o.frozen_tol, 0.0)
+    )
     volumes_alone = glide and o.volume_weight >= FillOptions.volume_weight
     fair = _FAIR if volumes_alone else math.inf
     newton = model.newton(x, glide=glide)
