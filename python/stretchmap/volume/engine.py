@@ -111,7 +111,8 @@ def solve(
     if left:
         reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")
-    run.history.budget = budget
+    if not len(run.problem.held):  # else the boundary may stay folded, and another start be better
+        run.history.budget = budget
     if on_mesh:
         return _glided_on_mesh(run)
     converged, reason, newton = _minimize(run, glide=glide)

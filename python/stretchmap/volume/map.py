@@ -42,7 +42,7 @@ _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 # Larger runs say beforehand how much they need.
 _LARGE = 1_000_000
 # Share of the time left that untangling may take, from each start; half of it if that is folded.
-_PATIENCE = (0.3, 0.5, 0.6, 0.6, 1.0)
+_PATIENCE = (0.4, 0.6, 0.6, 0.6, 1.0)
 
 
 @takes_threads
