@@ -49,7 +49,8 @@ _TIMES, _MORE = 2, 100
 class _Run:
     problem: VolumeProblem
     options: FillOptions
-    history: History
+    history: History  # with the share of time that untangling may take, at first
+    budget: Budget  # all of it
     seconds: dict[str, float] = field(default_factory=dict)
 
     def take(self, problem: VolumeProblem) -> None:
@@ -99,7 +100,8 @@ def solve(
     budget = budget or Budget.of(options, problem.solid.n_tets)
     clock = time.perf_counter()
     problem = started(problem, solver=options.solver, tol=_START_TOL)
-    run = _Run(problem, options, History(problem.model(options), budget.share(patience), progress))
+    history = History(problem.model(options), budget.share(patience), progress)
+    run = _Run(problem, options, history, budget)
     run.seconds["start"] = time.perf_counter() - clock
     on_mesh = glide and problem.ground is not None
     with run.timed("untangle"):
@@ -112,7 +114,7 @@ def solve(
         reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")
     if not len(run.problem.held):  # else the boundary may stay folded, and another start be better
-        run.history.budget = budget
+        history.budget = budget
     if on_mesh:
         return _glided_on_mesh(run)
     converged, reason, newton = _minimize(run, glide=glide)
@@ -268,13 +270,14 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
                 history.model, run.x, history, glide=True, start=first, goal=o.volume_weight
             )
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
+            history.budget = run.budget  # proven as it is: worth all the time there is
             with run.timed("release"):
                 released = _release(run)
-            if released:
+            if released or not done.converged:
                 with run.timed("glide"):
                     done = minimize(
                         history.model, run.x, history, glide=True,
-                        start=goal, goal=o.volume_weight,
+                        start=goal if released else o.volume_weight, goal=o.volume_weight,
                     )  # fmt: skip
         converged, reason, newton = done.converged, done.reason, done.newton
         if not _keep(run, done.x, True, "the map with a held boundary is kept"):

@@ -144,11 +144,24 @@ def test_a_source_that_meets_itself_is_not_started_again(monkeypatch):
     assert found.certificate.reason.startswith("the source surface touches or crosses itself")
 
 
+def test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monkeypatch):
+    def untangled(run, *, glide):
+        held = run.problem.solid.boundary_vertices[:9].astype(np.intp)
+        run.take(dataclasses.replace(run.problem, held=held))
+        return 0
+
+    monkeypatch.setattr(engine, "_untangle", untangled)
+    outcome = engine.solve(
+        problem, VolumeOptions(), glide=True, budget=Budget(600.0), patience=1e-6
+    )
+    assert outcome.converged and not len(outcome.problem.held)
+
+
 def test_folded_faces_are_better_than_inverted_tets(problem, monkeypatch):
     """Halving cures the one inverted tet at the price of more folded faces, which can be held."""
-    run = engine._Run(
-        problem, VolumeOptions(), History(problem.model(VolumeOptions()), Budget(60.0))
-    )
+    budget = Budget(60.0)
+    history = History(problem.model(VolumeOptions()), budget)
+    run = engine._Run(problem, VolumeOptions(), history, budget)
     n, held = problem.solid.n_vertices, []
     halved = lambda run: run.problem.solid.n_vertices > n  # noqa: E731
     monkeypatch.setattr(engine, "_untangle_inside", lambda run: np.arange(3))
