@@ -21,6 +21,7 @@ __all__ = ["boundary_starts"]
 
 _STEPS, _TOL = 100, 0.05
 _SEM_STEPS = 10
+_GENTLE = SHAPES[2:]  # lighter ones leave folds, which opened become needles
 
 
 def boundary_starts(
@@ -71,7 +72,7 @@ def boundary_starts(
     def gentle(ratio: Ratio | float) -> Iterator[AreaMap]:
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
-        maps = (chart(ratio, shape) for shape in SHAPES[2:])
+        maps = (chart(ratio, shape) for shape in _GENTLE)
         found = next((found for found in maps if found.certificate.certified), None)
         if found is not None:
             yield of_the_solid(found)
