@@ -55,8 +55,8 @@ def test_gliding_against_the_truth(pair, maps):
         for way, done in maps.items()
     }
     assert maps["glide"].distortion.total_distortion < 0.2 * true.total_distortion
-    assert error["glide"].mean() < 0.0215 and error["glide"][skin].mean() < 0.0205
-    assert error["glide"].max() < 0.1
+    assert error["glide"].mean() < 0.017 and error["glide"][skin].mean() < 0.016
+    assert error["glide"].max() < 0.08
     assert error["frozen"].mean() < 0.0095 and error["frozen"][skin].mean() < 0.009
 
 
@@ -181,8 +181,8 @@ def test_there_and_back_is_measured(pair, maps):
     back = sm.register(pair.target, pair.source, marks)
     gaps = sm.inverse_consistency(maps["glide"], back)
     assert gaps.shape == (maps["glide"].mesh.n_vertices,)
-    assert np.isnan(gaps).mean() < 0.01 and np.nanmedian(gaps) < 0.0105
-    assert np.nanpercentile(gaps, 95) < 0.031
+    assert np.isnan(gaps).mean() < 0.01 and np.nanmedian(gaps) < 0.008
+    assert np.nanpercentile(gaps, 95) < 0.024
     assert np.nanmax(gaps[pair.source_landmarks]) < 1e-9
     with pytest.raises(KindError):
         sm.inverse_consistency(maps["glide"], maps["glide"])
