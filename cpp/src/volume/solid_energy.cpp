@@ -69,11 +69,11 @@ SolidEnergy::Energies SolidEnergy::energies(const PointsRef& x, const EnergyWeig
   Energies found;
   found.tets.resize(k);
   found.det.resize(k);
-  constexpr Index kRun = 512;
+  constexpr Index kTetsAtOnce = 512;
 #pragma omp parallel for schedule(static)
-  for (Index run = 0; run < k; run += kRun)
+  for (Index run = 0; run < k; run += kTetsAtOnce)
     for_batches(
-        x, w, run, std::min(k, run + kRun), element_values, [](Index t) { return t; },
+        x, w, run, std::min(k, run + kTetsAtOnce), element_values, [](Index t) { return t; },
         [&](Index t, int lane, const ElementBatch& batch) {
           found.det[t] = batch.det[lane];
           found.tets[t] = batch.energy[lane];
