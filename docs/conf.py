@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from numpydoc.xref import DEFAULT_LINKS
+
 import stretchmap
 
 sys.path.insert(0, str(Path(__file__).parent))  # gallery_figures, mathml
@@ -25,8 +27,12 @@ html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
 html_title = f"stretchmap {release}"
 html_theme_options = {"navigation_with_keys": False, "show_prev_next": False}
-# Pages by themselves have no section to navigate.
-html_sidebars = {"*": [], "api": ["sidebar-nav-bs"]}
+# Pages by themselves have no section to navigate; API and folders do.
+alone = ("search", "genindex", *(page.stem for page in Path(__file__).parent.glob("*.md")))
+html_sidebars = {page: [] for page in alone if page != "api"}
+templates_path = ["templates"]
+html_static_path = ["static"]
+html_css_files = ["narrow.css"]
 exclude_patterns = [
     "results.md",
     "release.md",
@@ -39,6 +45,14 @@ myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 
 autosummary_generate = True
+autodoc_typehints = "none"  # the sections of the docstrings have them
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"  # but our classes; those of Python would need the network
+numpydoc_xref_aliases = {name: name for name in DEFAULT_LINKS} | {
+    name: f"stretchmap.{name}"
+    for name in stretchmap.__all__
+    if isinstance(getattr(stretchmap, name), type)
+}
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
