@@ -94,12 +94,12 @@ def transfer(
     means = np.clip(samples.mean(axis=1), samples.min(axis=1), samples.max(axis=1))
     per_tet = columns[solid.T].mean(axis=1) if per == "vertex" else columns
     wanted = solid.tet_volumes @ per_tet / solid.volume
-    bounds = columns.min(axis=0), columns.max(axis=0)
-    met = samples.min(axis=1), samples.max(axis=1)
-    missing = np.ones(len(wanted), bool)
-    for low, high in (met, bounds):
-        shifted, left = _shifted(means, target.tet_volumes, wanted, low, high)
-        means, missing = np.where(missing, shifted, means), missing & left
+    rounding = _rounding(solid, np.abs(per_tet)) + _rounding(target, np.abs(means))
+    for low, high in (
+        (samples.min(axis=1), samples.max(axis=1)),
+        (columns.min(axis=0), columns.max(axis=0)),
+    ):
+        means = _shifted(means, target.tet_volumes, wanted, rounding, low, high)
     if conserve == "integral":
         means *= solid.volume / target.volume
     return np.reshape(means * unit, (target.n_tets, *field.shape[1:]))
@@ -131,22 +131,28 @@ def _samples(
     return carried.reshape(target.n_tets, 4, -1)
 
 
+def _rounding(mesh: TetMesh, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What rounding may make of a mean over so many tets, their errors being as if at random."""
+    unit = np.finfo(float).eps * np.sqrt(mesh.n_tets)
+    return np.asarray(unit * (mesh.tet_volumes @ sizes) / mesh.volume)
+
+
 def _shifted(
     means: NDArray[np.float64],
     volumes: NDArray[np.float64],
     wanted: NDArray[np.float64],
+    rounding: NDArray[np.float64],
     low: NDArray[np.float64],
     high: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+) -> NDArray[np.float64]:
     """The means moved towards a bound, all by the same share, until theirs is as wanted.
 
-    At most up to the bound, and whether something is missing then: more than rounding, which is
-    not to be spread over tets where the field is zero.
+    At most up to the bound. Rounding is not made up for: nothing is to be spread over tets where
+    the field is zero that is missing nowhere.
     """
     missing = volumes.sum() * wanted - volumes @ means
+    missing[np.abs(missing) <= volumes.sum() * rounding] = 0.0
     room = np.where(missing > 0.0, high - means, low - means)
     most = volumes @ room
     share = np.divide(missing, most, out=np.zeros_like(missing), where=most != 0.0)
-    return np.asarray(means + np.clip(share, 0.0, 1.0) * room), (missing != 0.0) & (
-        (share > 1.0) | (most == 0.0)
-    )
+    return np.asarray(means + np.clip(share, 0.0, 1.0) * room)

@@ -120,6 +120,16 @@ def test_where_a_field_is_zero_all_round_it_stays_zero(registered):
         assert (out == 0.0).mean() > 0.3 and out.min() >= 0.0
 
 
+@pytest.mark.parametrize("conserve", ["integral", "mean"])
+@pytest.mark.parametrize("n_tets", [600, 3000, 20_000])
+def test_identity_keeps_every_tet_exactly(n_tets, conserve):
+    """No tet straddles two values, so what the sums round off has no place to go."""
+    solid = samples.bumpy_torus(n_tets)
+    fields = np.random.default_rng(n_tets).random((solid.n_tets, 40)) < np.linspace(0.01, 0.99, 40)
+    out = check(onto(solid, solid.V, solid), fields.astype(float), "tet", conserve)
+    assert np.array_equal(out, fields)
+
+
 def test_vector_fields_are_carried_column_by_column(registered):
     solid = registered.mesh
     field = np.column_stack([solid.V, np.ones(solid.n_vertices)])
