@@ -103,6 +103,30 @@ def thin_wall(thickness, n_tets=12_000):
     return TetMesh(np.stack([x * scale, y * scale, z], axis=1), solid.T)
 
 
+def _rod(V, loop, axis, rings, step, girth=1.0):
+    """Points, those of so many rings after them; rows (rings + 1, m) of loop and rings."""
+    out = step * np.arange(1, rings + 1)[:, None, None] * axis / np.linalg.norm(axis)
+    ring = girth * V[loop] + (1.0 - girth) * V[loop].mean(axis=0)
+    rows = len(V) + np.arange(rings * len(loop)).reshape(rings, -1)
+    return np.vstack([V, (ring + out).reshape(-1, 3)]), np.vstack([loop, rows])
+
+
+def with_limb(surface: TriMesh, rings: int, step: float) -> TriMesh:
+    """A narrower tube of so many rings, each a step on, round vertex 0; its tip comes last."""
+    round_it = (surface.F == 0).any(axis=1)
+    star = [np.roll(face, -int(np.argmin(face))) for face in surface.F[round_it]]
+    after, loop = {int(b): int(c) for _, b, c in star}, [int(star[0][1])]
+    while after[loop[-1]] != loop[0]:
+        loop.append(after[loop[-1]])
+    V, low = _rod(surface.V, loop, surface.V[0], rings, step, girth=0.6)
+    V[0] = V[loop].mean(axis=0) + (rings + 1) * step * V[0] / np.linalg.norm(V[0])
+    on = np.roll(low, -1, axis=1)
+    tube = [[low[:-1], on[:-1], on[1:]], [low[:-1], on[1:], low[1:]]]
+    new = [*tube, [low[-1], on[-1], np.zeros_like(low[-1])]]
+    F = [surface.F[~round_it], *(np.stack(corners, axis=-1).reshape(-1, 3) for corners in new)]
+    return TriMesh(np.roll(V, -1, axis=0), (np.vstack(F) - 1) % len(V))
+
+
 def with_branch(solid: TetMesh, rings: int, step: float, across: bool = False) -> TetMesh:
     """A triangular rod of so many rings, each a step on, on the outermost face.
 
@@ -112,12 +136,9 @@ def with_branch(solid: TetMesh, rings: int, step: float, across: bool = False) -
     centers = solid.V[faces].mean(axis=1) * [1.0, 1.0, 0.0]
     far = np.linalg.norm(centers, axis=1)
     face = np.argmin(far) if across else np.argmax(far)
-    loop = faces[face]
-    a, b, c = solid.V[loop]
+    a, b, c = solid.V[faces[face]]
     axis = -centers[face] if across else np.cross(b - a, c - a)
-    out = step * np.arange(1, rings + 1)[:, None, None] * axis / np.linalg.norm(axis)
-    V = np.vstack([solid.V, (solid.V[loop] + out).reshape(-1, 3)])
-    rows = np.vstack([loop, solid.n_vertices + np.arange(3 * rings).reshape(-1, 3)])
+    V, rows = _rod(solid.V, faces[face], axis, rings, step)
     low, high = rows[:-1].T, rows[1:].T
     rod = np.vstack(
         [

@@ -8,47 +8,25 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
-from shapes import with_branch
+from shapes import with_branch, with_limb
 from stretchmap import _core
 from stretchmap.area import map as area
 from stretchmap.area.flat import unfolded_turns
 from stretchmap.errors import CertificationError, SolverError
 
 
-def with_limb(rings: int, step: float = 0.12) -> sm.TriMesh:
-    """A torus with a tube of so many rings in place of vertex 0."""
-    torus = sm.samples.torus_surface(36, 18)
-    points, faces = [*torus.V], [f for f in torus.F.tolist() if 0 not in f]
-    after = {}
-    for f in torus.F.tolist():
-        if 0 in f:
-            k = f.index(0)
-            after[f[(k + 1) % 3]] = f[(k + 2) % 3]
-    loop = [next(iter(after))]
-    while after[loop[-1]] != loop[0]:
-        loop.append(after[loop[-1]])
-    rim = torus.V[loop]
-    center, out = rim.mean(axis=0), torus.V[0] / np.linalg.norm(torus.V[0])
-    for r in range(1, rings + 1):
-        ring = list(range(len(points), len(points) + len(rim)))
-        points += [*(center + 0.6 * (rim - center) + r * step * out)]
-        for i in range(len(rim)):
-            j = (i + 1) % len(rim)
-            faces += [[loop[i], loop[j], ring[j]], [loop[i], ring[j], ring[i]]]
-        loop = ring
-    points.append(center + (rings + 1) * step * out)
-    faces += [[loop[i], loop[(i + 1) % len(rim)], len(points) - 1] for i in range(len(rim))]
-    return sm.TriMesh(np.array(points)[1:], np.array(faces) - 1)
+def limb(rings: int) -> sm.TriMesh:
+    return with_limb(sm.samples.torus_surface(36, 18), rings, 0.12)
 
 
 @pytest.mark.parametrize("rings", [30, 60, 100])
 def test_a_limb_is_mapped_without_a_fold(rings):
-    result = sm.area_map(with_limb(rings))
+    result = sm.area_map(limb(rings))
     assert result.certificate.certified and result.distortion.flips == 0
 
 
 def test_a_folded_start_is_replaced_by_one_without_folds():
-    surface = with_limb(40)
+    surface = limb(40)
     conformal = sm.conformal_map(surface)
     noise = 0.05 * np.random.default_rng(1).normal(size=conformal.turns.shape)
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
@@ -59,7 +37,7 @@ def test_a_folded_start_is_replaced_by_one_without_folds():
 
 def test_a_limb_beyond_the_reach_of_numbers_is_refused_with_the_remedy():
     with pytest.raises(SolverError, match="cut the limb short") as refused:
-        sm.area_map(with_limb(250))
+        sm.area_map(limb(250))
     assert len(refused.value.ids) > 0
 
 
