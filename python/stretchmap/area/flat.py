@@ -34,7 +34,11 @@ def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.floa
         # Positive weights embed the surface in a flat torus whatever its triangles (Tutte); but a
         # long limb shrinks by a factor with every turn of its girth, until its tip is lost in
         # rounding. Weights that fall where areas fall let it shrink less.
-        turns = _core.forms.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
+        # Vertex 0 is held: if but small weights joined it to the rest, all else would be rounding.
+        held = int(np.argmax(np.bincount(surface.edges.ravel(), np.repeat(weights, 2))))
+        swap = np.arange(len(surface.V), dtype=np.int32)
+        swap[[0, held]] = held, 0
+        turns = _core.forms.harmonic_forms(len(swap), swap[surface.edges], weights, forms)[1][swap]
         ratios = np.maximum(_core.area.turn_areas(chart, turns), 0.0) / share
         stretch = np.bincount(edge, np.repeat(np.sqrt(ratios), 3), len(weights))
         weights = np.maximum(stretch, _LEAST_WEIGHT)

@@ -25,8 +25,11 @@ def test_a_limb_is_mapped_without_a_fold(rings):
     assert result.certificate.certified and result.distortion.flips == 0
 
 
-def test_a_folded_start_is_replaced_by_one_without_folds():
-    surface = limb(40)
+@pytest.mark.parametrize("ahead", [0, 1, 20, 60])
+def test_a_folded_start_is_replaced_by_one_without_folds(ahead):
+    """Whether numbers end with the tip or begin with so many of its vertices."""
+    V, F = limb(40).V, limb(40).F
+    surface = sm.TriMesh(np.roll(V, ahead, axis=0), (F + ahead) % len(V))
     conformal = sm.conformal_map(surface)
     noise = 0.05 * np.random.default_rng(1).normal(size=conformal.turns.shape)
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
