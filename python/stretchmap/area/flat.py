@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from .. import _core
 from ..base.arrays import describe
@@ -16,40 +18,55 @@ from ..errors import SolverError
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-_EMBEDDINGS = 6
-_LEAST_WEIGHT = 1e-12
+# Factors by which weights fall from edge to edge outward on what the flat map has lost.
+_FALLS = (0.5, 0.2, 0.1, 0.05, 0.03, 0.02, 0.01)
+_LEAST_WEIGHT = 1e-250
+_LEAST_AREA = 1e-30  # of a face in the chart: rounding moves its corners by 1e-16
+_SAFE = 1e-8  # share of its area that a face keeps in a flat map that has not lost it
 
 
 def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.float64]:
-    """The conformal map's turns or, if it has folds, those of a map that has none."""
+    """The conformal map's turns or, if it has folds, those of a map that has none.
+
+    Positive weights embed the surface in a flat torus whatever its triangles (Tutte). But a long
+    limb shrinks with every radius outward by the factor e, until its tip is lost in rounding. Where
+    weights fall by exp(-a) meanwhile, sizes fall by exp((a - sqrt(a^2 + 4)) / 2) only, nearly
+    exp(-1 / a).
+    """
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
-    turns, weights = conformal.turns, np.ones(len(surface.edges))
+    if (_core.area.turn_areas(chart, conformal.turns) > 0.0).all():
+        return conformal.turns
     forms = conformal.forms.astype(float)
-    share = surface.face_areas / surface.face_areas.sum()
-    edge = surface.topology.edge
-    for _ in range(_EMBEDDINGS):
-        areas = _core.area.turn_areas(chart, turns)
-        if (areas > 0.0).all():
-            break
-        # Positive weights embed the surface in a flat torus whatever its triangles (Tutte); but a
-        # long limb shrinks by a factor with every turn of its girth, until its tip is lost in
-        # rounding. Weights that fall where areas fall let it shrink less.
+    weights = np.ones(len(surface.edges))
+    steps, folded = np.empty(0), np.empty(0, np.intp)
+    for fall in (1.0, *_FALLS):
+        if fall < 1.0:
+            weights = np.maximum(fall, _LEAST_WEIGHT ** (1.0 / steps.max())) ** steps
         # Vertex 0 is held: if but small weights joined it to the rest, all else would be rounding.
         held = int(np.argmax(np.bincount(surface.edges.ravel(), np.repeat(weights, 2))))
         swap = np.arange(len(surface.V), dtype=np.int32)
         swap[[0, held]] = held, 0
         turns = _core.forms.harmonic_forms(len(swap), swap[surface.edges], weights, forms)[1][swap]
-        ratios = np.maximum(_core.area.turn_areas(chart, turns), 0.0) / share
-        stretch = np.bincount(edge, np.repeat(np.sqrt(ratios), 3), len(weights))
-        weights = np.maximum(stretch, _LEAST_WEIGHT)
-    folded = np.flatnonzero(~(_core.area.turn_areas(chart, turns) > 0.0))
-    if len(folded):
-        raise SolverError(
-            f"{describe('face', folded)} lie so far out on a long, thin limb that a flat map "
-            "shrinks them to nothing: cut the limb short or remesh it coarser",
-            folded,
-        )
-    return turns
+        areas = _core.area.turn_areas(chart, turns)
+        folded = np.flatnonzero(~(areas > _LEAST_AREA))
+        if not len(folded):
+            return turns
+        if fall == 1.0:
+            kept = areas > _SAFE * surface.face_areas / surface.face_areas.sum()
+            steps = _steps_from(surface, np.unique(surface.F[kept]))
+    raise SolverError(
+        f"{describe('face', folded)} lie so far out on a long, thin limb that a flat map "
+        "shrinks them to nothing: cut the limb short or remesh it coarser",
+        folded,
+    )
+
+
+def _steps_from(surface: TriMesh, vertices: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(e,) number of edges between each edge and the nearest of `vertices`."""
+    n, (i, j) = len(surface.V), surface.edges.T
+    graph = coo_matrix((np.ones(len(i)), (i, j)), (n, n))
+    steps = dijkstra(graph, directed=False, indices=vertices, unweighted=True, min_only=True)
+    return np.minimum(steps[i], steps[j])
 
 
 def start_angles(
