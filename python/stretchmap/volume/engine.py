@@ -29,14 +29,13 @@ from .minimize import minimize
 from .model import History
 from .options import FillOptions, VolumeOptions
 from .problem import Outcome, VolumeProblem
-from .start import started
+from .start import START_TOL, started
 from .untangle import folded_faces, stuck_tets, untangle_patches, untangle_whole
 
 __all__ = ["solve"]
 
 _log = logging.getLogger("stretchmap")
 
-_START_TOL = 1e-4
 _ROUNDS = 12
 _RINGS = (2, 4)  # reach of the patches, to begin with and where that does not help
 # Inverted tets: with a larger share of all, it is not a matter of single places.
@@ -99,7 +98,7 @@ def solve(
     """
     budget = budget or Budget.of(options, problem.solid.n_tets)
     clock = time.perf_counter()
-    problem = started(problem, solver=options.solver, tol=_START_TOL)
+    problem = started(problem, solver=options.solver, tol=START_TOL)
     history = History(problem.model(options), budget.share(patience), progress)
     run = _Run(problem, options, history, budget)
     run.seconds["start"] = time.perf_counter() - clock

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import logging
 import time
-from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -29,6 +28,7 @@ from .engine import solve
 from .options import VolumeOptions, balanced, check_call
 from .own import Optimizer, run_optimizer
 from .problem import VolumeProblem
+from .ranked_starts import Start, ranked_starts
 from .result import VolumeMap, volume_result
 from .vsem import run_vsem
 
@@ -42,7 +42,7 @@ _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 # Larger runs say beforehand how much they need.
 _LARGE = 1_000_000
 # Share of the time left that untangling may take, from each start; half of it if that is folded.
-_PATIENCE = (0.4, 0.6, 0.6, 0.6, 1.0)
+_PATIENCE: tuple[float, ...] = (0.4, 0.6, 0.6, 0.6, 1.0)
 
 
 @takes_threads
@@ -204,21 +204,19 @@ def _certified_map(
 ) -> VolumeMap:
     """The map from the first start that leads to a certified one, or the best there is."""
     budget = Budget.of(options, solid.n_tets)
-    starts: Iterator[MapResult] = iter([start] if start is not None else [])
-    patience: tuple[float, ...] = (1.0,)
     if start is None:
-        starts = boundary_starts(solid, options, glide=glide, progress=progress)
-        patience = _PATIENCE
+        starts, patience = ranked_starts(solid, options, glide=glide, progress=progress), _PATIENCE
+    else:
+        starts, patience = iter([Start(start, _problem(solid, start, options))]), (1.0,)
     best, clock, vain = None, time.perf_counter(), 0.0
     for begin, share in zip(starts, patience, strict=False):
-        image, torus = _start_of(solid, begin)
-        problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
-        if begin is not start and not _unfolded(begin):
+        if start is None and not _unfolded(begin.map):
             share *= 0.5
         outcome = solve(
-            problem, options, glide=glide, budget=budget, patience=share, progress=progress
+            begin.problem, options, glide=glide, budget=budget, patience=share, progress=progress
         )
-        found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin)
+        outcome.seconds["start"] += begin.seconds
+        found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
         if best is None or _better(found, best):
             best = found
         if best.certificate.certified or budget.spent:
@@ -231,6 +229,11 @@ def _certified_map(
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
+
+
+def _problem(solid: TetMesh, start: MapResult, options: VolumeOptions) -> VolumeProblem:
+    image, torus = _start_of(solid, start)
+    return VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
 
 
 def _unfolded(start: MapResult) -> bool:
@@ -247,8 +250,7 @@ def _own_map(
     """The map an optimizer of the user's own makes of the first start."""
     if start is None:
         start = next(boundary_starts(solid, options, glide=False, progress=progress))
-    image, torus = _start_of(solid, start)
-    problem = VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
+    problem = _problem(solid, start, options)
     outcome = run_optimizer(problem, optimizer, solver=options.solver)
     name = getattr(optimizer, "__name__", type(optimizer).__name__)
     return volume_result(outcome, name, "own", start)

@@ -49,6 +49,8 @@ class VolumeProblem:
     ground : TriMesh or None
         The same if that is a mesh.
     scale : ndarray, shape (n,), or None
+    begun : bool
+        Whether inner rows of ``x`` and the scale are those the optimization begins with.
     held, pinned : ndarray of intp
         As in `SolidModel`.
     """
@@ -62,6 +64,7 @@ class VolumeProblem:
     warm: bool
     torus: Torus | None = None
     scale: NDArray[np.float64] | None = None
+    begun: bool = False
     held: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
     ground: TriMesh | None = None
     pinned: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))

@@ -11,7 +11,9 @@ from .. import _core
 from .model import face_areas
 from .problem import VolumeProblem
 
-__all__ = ["boundary_scale", "started"]
+__all__ = ["START_TOL", "boundary_scale", "started"]
+
+START_TOL = 1e-4  # residual of a harmonic map that is only to be improved
 
 _EVEN = 0.2  # logarithm: a boundary image whose scale varies less has one scale
 _SCALE_TOL = 1e-3
@@ -57,11 +59,13 @@ def started(problem: VolumeProblem, *, solver: str, tol: float) -> VolumeProblem
     Parameters
     ----------
     problem : VolumeProblem
-        A warm one keeps its image.
+        A warm one keeps its image, one that has begun is returned as it is.
     solver : str
     tol : float
         Relative residual asked of the harmonic map.
     """
+    if problem.begun:
+        return problem
     solid, ids = problem.solid, problem.solid.boundary_vertices
     fixed = np.zeros(solid.n_vertices, np.uint8)
     fixed[ids] = 1
@@ -80,4 +84,4 @@ def started(problem: VolumeProblem, *, solver: str, tol: float) -> VolumeProblem
         scale = np.ascontiguousarray(stretch.harmonic(problem.V, spread, _SCALE_TOL)[0][:, 0])
         # Cotangent weights may be negative, so the spread may overshoot.
         np.clip(scale, at_boundary.min(), at_boundary.max(), out=scale)
-    return dataclasses.replace(problem, x=x, scale=scale)
+    return dataclasses.replace(problem, x=x, scale=scale, begun=True)
