@@ -41,7 +41,7 @@ def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.floa
     steps, folded = np.empty(0), np.empty(0, np.intp)
     for fall in (1.0, *_FALLS):
         if fall < 1.0:
-            weights = np.maximum(fall, _LEAST_WEIGHT ** (1.0 / steps.max())) ** steps
+            weights = np.maximum(fall, _LEAST_WEIGHT ** (1.0 / max(steps.max(), 1.0))) ** steps
         # Vertex 0 is held: if but small weights joined it to the rest, all else would be rounding.
         held = int(np.argmax(np.bincount(surface.edges.ravel(), np.repeat(weights, 2))))
         swap = np.arange(len(surface.V), dtype=np.int32)
