@@ -66,7 +66,8 @@ def _steps_from(surface: TriMesh, vertices: NDArray[np.int32]) -> NDArray[np.flo
     n, (i, j) = len(surface.V), surface.edges.T
     graph = coo_matrix((np.ones(len(i)), (i, j)), (n, n))
     steps = dijkstra(graph, directed=False, indices=vertices, unweighted=True, min_only=True)
-    return np.minimum(steps[i], steps[j])
+    least: NDArray[np.float64] = np.minimum(steps[i], steps[j])
+    return least
 
 
 def start_angles(

@@ -15,7 +15,7 @@ from ..base.threads import takes_threads
 from ..base.torus import TWO_PI, Torus
 from ..certificate.checks import certify
 from ..conformal.map import ConformalMap, conformal_map
-from ..errors import CertificationError, OptionError
+from ..errors import CertificationError, OptionError, SolverError
 from ..homology.basis import HomologyBasis
 from ..mesh.given import as_surface, require_same_mesh
 from .coarse import Level, levels
@@ -186,7 +186,11 @@ def along(
         if route.finish == "none" or found.certificate.certified or not _folded(found):
             break
         _log.info("%s: once more with weight %g of shape", found.certificate.reason, shape)
-        made = follow(dataclasses.replace(route, shape=shape), [finest], progress)
+        try:
+            made = follow(dataclasses.replace(route, shape=shape), [finest], progress)
+        except SolverError as error:  # sizes of faces are lost in rounding; what there is, stands
+            _log.info("%s", error)
+            continue
         made.reason = f"faces folded where areas alone counted; {made.reason}"
         other = _result(surface, conformal, made, torus)
         if other.certificate.certified or _folded(other) < _folded(found):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from ..area.finish import Steps
 from ..area.map import SHAPES, along, finished
@@ -13,11 +14,14 @@ from ..area.route import Route
 from ..area.search import Ratio
 from ..base.progress import Progress
 from ..conformal.map import conformal_map
+from ..errors import SolverError
 from ..mesh.meshes import TetMesh, TriMesh
 from .anisotropy import unstretching
 from .options import VolumeOptions
 
 __all__ = ["boundary_starts"]
+
+_log = logging.getLogger("stretchmap")
 
 _STEPS, _TOL = 100, 0.05
 _SEM_STEPS = 10
@@ -46,63 +50,96 @@ def boundary_starts(
     ------
     AreaMap
         Of ``solid.surface``, certified or not.
+
+    Raises
+    ------
+    SolverError
+        None could be made.
     """
-    surface = solid.surface
     unstretch = unstretching(solid.V, solid.T) if glide else None
+    surface = solid.surface
     if unstretch is not None:
         surface = TriMesh(surface.V @ unstretch, surface.F)
-    conformal = conformal_map(surface, progress=progress)
+    maps = _BoundaryMaps(surface, options, progress)
+    makers: list[Callable[[], AreaMap | None]]
+    if glide:
+        on_fatter = [maps.fatter, lambda: maps.gentle(maps.fatter_ratio)]
+        makers = [maps.unfolded, *(on_fatter if options.ratio is None else [])]
+        makers += [lambda: maps.gentle(maps.ratio), maps.folded, lambda: maps.after(_STEPS)]
+    else:
+        makers = [lambda: maps.after(_STEPS), lambda: maps.after(0), maps.gentle_finished]
+    for found in _all_there_are(makers):
+        if unstretch is not None:
+            reason = f"{found.stop_reason}, a stretch of the surface undone"
+            found = dataclasses.replace(
+                found, mesh=solid.surface, converged=False, stop_reason=reason
+            )
+        yield found
 
-    def chart(ratio: Ratio | float, shape: float = 0.0) -> AreaMap:
-        route = Route(options.phase, ratio, _SEM_STEPS, "none", Steps(0, _TOL, math.inf), shape)
-        return along(route, surface, conformal, progress)
 
-    ratio: Ratio | float = options.ratio or "search"
-    first = chart(ratio)
+def _all_there_are(makers: Iterable[Callable[[], AreaMap | None]]) -> Iterator[AreaMap]:
+    """What they make; an error is raised only if none makes anything."""
+    failed, any_made = None, False
+    for make in makers:
+        try:
+            found = make()
+        except SolverError as error:
+            _log.info("one start less: %s", error)
+            failed = failed or error
+            continue
+        if found is not None:
+            any_made = True
+            yield found
+    if failed is not None and not any_made:
+        raise failed
 
-    def steps(number: int) -> AreaMap:
-        return finished(first, max_iter=number, tol=_TOL, progress=progress)
 
-    def of_the_solid(found: AreaMap) -> AreaMap:
-        if unstretch is None:
+class _BoundaryMaps:
+    def __init__(self, surface: TriMesh, options: VolumeOptions, progress: Progress | None) -> None:
+        self.surface, self.phase, self.progress = surface, options.phase, progress
+        self.conformal = conformal_map(surface, progress=progress)
+        self.ratio: Ratio | float = options.ratio or "search"
+        self.first = self._chart(self.ratio)
+
+    @property
+    def fatter_ratio(self) -> float:
+        """Halfway, on the scale of log(R / r), to where the hole of the torus closes.
+
+        The torus whose areas fit best can be too thin for what is inside; this one has cured that
+        wherever it was met.
+        """
+        return math.sqrt(self.first.ratio)
+
+    def after(self, steps: int) -> AreaMap:
+        """The first, its faces turned outward, and so many steps on their areas."""
+        return finished(self.first, max_iter=steps, tol=_TOL, progress=self.progress)
+
+    def unfolded(self) -> AreaMap | None:
+        # Faces that look inward cost the interior more steps than unfolding them beforehand; but
+        # where that gets stuck, it leaves needles that no gliding opens again.
+        found = self.first if self.first.certificate.certified else self.after(0)
+        return None if found.history[-1].flips else found
+
+    def folded(self) -> AreaMap | None:
+        return None if self.first.certificate.certified else self.first
+
+    def fatter(self) -> AreaMap:
+        found = self._chart(self.fatter_ratio)
+        if found.certificate.certified:
             return found
-        reason = f"{found.stop_reason}, a stretch of the surface undone"
-        return dataclasses.replace(found, mesh=solid.surface, converged=False, stop_reason=reason)
+        return finished(found, max_iter=0, tol=_TOL, progress=self.progress)
 
-    def gentle(ratio: Ratio | float) -> Iterator[AreaMap]:
+    def gentle(self, ratio: Ratio | float) -> AreaMap | None:
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
-        maps = (chart(ratio, shape) for shape in _GENTLE)
-        found = next((found for found in maps if found.certificate.certified), None)
-        if found is not None:
-            yield of_the_solid(found)
+        maps = (self._chart(ratio, shape) for shape in _GENTLE)
+        return next((found for found in maps if found.certificate.certified), None)
 
-    def fatter() -> Iterator[AreaMap]:
-        # The torus whose areas fit best can be too thin for what is inside; one halfway, on the
-        # scale of log(R / r), to where its hole closes has cured that wherever it was met.
-        if options.ratio is not None:
-            return
-        ratio = math.sqrt(first.ratio)
-        found = chart(ratio)
-        if not found.certificate.certified:
-            found = finished(found, max_iter=0, tol=_TOL, progress=progress)
-        yield of_the_solid(found)
-        yield from gentle(ratio)
+    def gentle_finished(self) -> AreaMap | None:
+        found = self.gentle(self.ratio)
+        return found and finished(found, max_iter=_STEPS, tol=_TOL, progress=self.progress)
 
-    if not glide:
-        yield steps(_STEPS)
-        yield steps(0)
-        for found in gentle(ratio):
-            yield finished(found, max_iter=_STEPS, tol=_TOL, progress=progress)
-        return
-    # Faces that look inward cost the interior more steps than unfolding them beforehand; but where
-    # that gets stuck, it leaves needles that no gliding opens again.
-    unfolded = first if first.certificate.certified else steps(0)
-    stuck = unfolded.history[-1].flips > 0
-    if not stuck:
-        yield of_the_solid(unfolded)
-    yield from fatter()
-    yield from gentle(ratio)
-    if first is not unfolded:
-        yield of_the_solid(first)
-    yield of_the_solid(steps(_STEPS))
+    def _chart(self, ratio: Ratio | float, shape: float = 0.0) -> AreaMap:
+        steps = Steps(0, _TOL, math.inf)
+        route = Route(self.phase, ratio, _SEM_STEPS, "none", steps, shape)
+        return along(route, self.surface, self.conformal, self.progress)

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from stretchmap.errors import SolverError
+from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import ranked_starts as module
 from stretchmap.volume.boundary_starts import boundary_starts
 from stretchmap.volume.options import VolumeOptions
@@ -66,3 +68,17 @@ def test_the_better_start_is_what_the_map_begins_with(monkeypatch, plain):
     found = sm.volume_map(SOLID)
     assert found.certificate.certified and "other starts" not in found.seconds
     assert found.boundary_map is plain
+
+
+def test_a_start_that_cannot_be_made_is_passed_over(monkeypatch):
+    def fails(*_):
+        raise SolverError("faces are flipped in the chart", ())
+
+    maps = boundary_starts_module._BoundaryMaps
+    for name in ("unfolded", "fatter"):
+        monkeypatch.setattr(maps, name, fails)
+    assert next(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None)).certificate
+    for name in ("gentle", "folded", "after"):
+        monkeypatch.setattr(maps, name, fails)
+    with pytest.raises(SolverError, match="flipped in the chart"):
+        next(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
