@@ -7,6 +7,7 @@ hexahedra sheared, some of them turned over; `optimize` makes them good.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,7 @@ from .optimize import GridOptimizer
 from .quality import MOST_MISSED, boundary_distances, boundary_quads, missed_volume
 from .schedule import Schedule
 from .sizes import grid_candidates
-from .start import best_start, equal_axes, pulled_back
+from .start import Start, best_starts, equal_axes, pulled_back
 
 if TYPE_CHECKING:
     from ..maps.result import MapResult
@@ -38,6 +39,9 @@ __all__ = ["HexMesh", "hex_mesh"]
 _MOST = 100_000  # hexahedra in any direction
 _BYTES_PER_HEX = 12_000  # at the peak, as measured at 200,000
 _COARSE = 16_000  # hexahedra that are optimized at once
+# Of grids as close to the surface as this share of the diagonal, or none of them, but all within
+# this factor of the closest, the shape decides.
+_CLOSE, _ALIKE = 0.005, 1.25
 # Of a grid that was split in eight: smaller quads fit better.
 _FINER = Schedule(
     fit=3.0,
@@ -103,11 +107,12 @@ def hex_mesh(
 
     Notes
     -----
-    Up to three choices of the numbers are begun with, sizes made even under a loose fit before the
-    boundary is held to the surface; the one whose boundary comes closest is gone on with. A grid of
-    more than 16,000 hexahedra with even numbers is optimized with half the numbers first, then
-    split in eight and finished. Where that fails in the solid as it is, its principal axes are made
-    equally long for the optimization.
+    Up to four choices of the numbers are begun with, sizes made even under a loose fit before the
+    boundary is held to the surface; the two whose boundaries come closest are gone on with. The one
+    that ends closer is returned; of two within half a per cent of the diagonal, or both farther and
+    about as far, the better shaped. A grid of more than 16,000 hexahedra with even numbers is
+    optimized with half the numbers first, then split in eight and finished. Where that fails in the
+    solid as it is, its principal axes are made equally long for the optimization.
 
     References
     ----------
@@ -135,13 +140,13 @@ def hex_mesh(
     if flag("optimize", optimize):
         while count > _COARSE * 8**levels and not np.any(np.array(candidates) % 2 ** (levels + 1)):
             levels += 1
-        start = best_start(result, solid, np.array(candidates) // 2**levels, progress)
+        starts = best_starts(result, solid, np.array(candidates) // 2**levels, progress)
+        start = _best_optimized(starts, solid, progress)
     else:
         start = pulled_back(result, candidates[0])
     layout, grid, pulled, V = start.layout, start.grid, start.pulled, start.V
     n_invalid = int((_core.resample.valid_hexes(pulled, layout.H) == 0).sum())
     if optimize:
-        V = _optimized(V, layout.H, solid, Schedule(), progress)
         for level in range(levels):
             finer = prolongation(*(k * 2**level for k in start.numbers))
             layout = swept_layout(*(k * 2 ** (level + 1) for k in start.numbers))
@@ -193,6 +198,34 @@ def _numbers(
             whole("rings", first[2] if rings is None else rings, 1, _MOST),
         )
     ]
+
+
+def _best_optimized(starts: list[Start], solid: TetMesh, progress: Progress | None) -> Start:
+    """The start that ends best, its points optimized: close to the surface, then of good shape.
+
+    Raises
+    ------
+    SolverError
+        Hexahedra of each are left that could not be made valid; those of the first.
+    """
+    ended: list[tuple[float, float, Start]] = []
+    failure = None
+    diagonal = float(np.linalg.norm(np.ptp(solid.V, axis=0)))
+    for start in starts:
+        H = start.layout.H
+        try:
+            V = _optimized(start.V, H, solid, Schedule(), progress)
+        except SolverError as error:
+            failure = failure or error
+            continue
+        away = max(boundary_distances(V, boundary_quads(H), solid.surface)) / diagonal
+        least = float(_core.resample.scaled_jacobians(V, H).min())
+        ended.append((away, least, replace(start, V=V)))
+    if failure is not None and not ended:
+        raise failure
+    closest = min(away for away, _, _ in ended)
+    limit = _CLOSE if closest <= _CLOSE else _ALIKE * closest
+    return max((end for end in ended if end[0] <= limit), key=lambda end: end[1])[2]
 
 
 def _optimized(

@@ -12,7 +12,8 @@ from .. import _core
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-_PER_SIDE = 4
+_SAMPLES = 200_000  # of the boundary of a grid ...
+_PER_SIDE = (4, 10)  # ... with at least and at most so many along a side of a quad
 MOST_MISSED = 0.02  # of the volume; a grid that misses more is made another way
 
 # Faces, seen from outside.
@@ -60,20 +61,22 @@ def boundary_distances(
 ) -> tuple[float, float]:
     """Largest distances from quads to a surface and from the surface to the quads.
 
-    Points of a quad are sampled on the bilinear patch of its corners, `_PER_SIDE` along each side;
-    of the surface the vertices and the centers of its faces are, and the patches are replaced by
-    four triangles each.
+    Points of a quad are sampled on the bilinear patch of its corners, which for the way back is
+    replaced by triangles between them: quads may be ten times as long as wide, and warped. Of the
+    surface the vertices and the centers of its faces are sampled.
     """
-    t = np.linspace(0.0, 1.0, _PER_SIDE)
+    side = int(np.clip(np.sqrt(_SAMPLES / len(quads)), *_PER_SIDE))
+    t = np.linspace(0.0, 1.0, side)
     x, y = (a.ravel() for a in np.meshgrid(t, t))
     weights = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
-    there = np.einsum("sc,bcx->bsx", weights, V[quads]).reshape(-1, 3)
+    there = np.ascontiguousarray(np.einsum("sc,bcx->bsx", weights, V[quads]).reshape(-1, 3))
     outward = _largest_distance(surface.V, surface.F, there)
-    centers = np.arange(len(V), len(V) + len(quads), dtype=np.int32)
-    fans = [np.stack([quads[:, k], quads[:, (k + 1) % 4], centers], axis=1) for k in range(4)]
-    points = np.concatenate([V, V[quads].mean(axis=1)])
+    here = np.arange(side * side).reshape(side, side)
+    a, b, c, d = here[:-1, :-1], here[:-1, 1:], here[1:, 1:], here[1:, :-1]
+    cells = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    patches = (cells + side * side * np.arange(len(quads))[:, None, None]).reshape(-1, 3)
     sites = np.concatenate([surface.V, surface.V[surface.F].mean(axis=1)])
-    return outward, _largest_distance(points, np.concatenate(fans), sites)
+    return outward, _largest_distance(there, patches.astype(np.int32), sites)
 
 
 def _largest_distance(

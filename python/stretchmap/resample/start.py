@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from ..maps.result import MapResult
     from ..mesh.meshes import TetMesh
 
-__all__ = ["Start", "best_start", "equal_axes", "pulled_back"]
+__all__ = ["Start", "best_starts", "equal_axes", "pulled_back"]
 
 _BISECTIONS = 40
+_KEPT = 2  # after the first rounds: which of them ends closer is not known yet
 _TRIAL = Schedule(even=tuple(np.geomspace(0.003, 1.0, 16)), powers=(1.0,) * 2 + (2.0,) * 2)
 
 
@@ -53,41 +54,43 @@ class Start:
     V: NDArray[np.float64]
 
 
-def best_start(
+def best_starts(
     result: MapResult,
     solid: TetMesh,
     candidates: Sequence[Sequence[int]] | NDArray[np.int_],
     progress: Progress | None = None,
-) -> Start:
-    """The grid whose boundary is the closest to the surface after the first rounds.
+) -> list[Start]:
+    """The two grids whose boundaries are the closest to the surface after the first rounds.
 
-    One that is not valid after them, or has lost the surface, comes after all others, as it was
-    pulled back.
+    Where none is valid after them, or all have lost the surface, the closest as it was pulled back.
 
     Raises
     ------
     SolverError
         No candidate could be pulled back and begun with.
     """
-    best, least, failure = None, (2, np.inf), None
+    sound: list[tuple[float, Start]] = []
+    lost: list[tuple[float, Start]] = []
+    failure = None
     for numbers in candidates:
         start = pulled_back(result, numbers)
-        optimizer = GridOptimizer(start.V, start.layout.H, solid.surface)
+        H = start.layout.H
+        optimizer = GridOptimizer(start.V, H, solid.surface)
         try:
             positive = optimizer.run(_TRIAL, progress)
         except SolverError as error:
             failure = error
             continue
-        H = start.layout.H
+        away = max(boundary_distances(optimizer.V, boundary_quads(H), solid.surface))
         # Of what is tangled throughout, validity takes long to decide.
-        lost = not positive or missed_volume(optimizer.V, H, solid.surface) > MOST_MISSED
-        V = start.V if lost else optimizer.V
-        away = max(boundary_distances(V, boundary_quads(H), solid.surface))
-        if (int(lost), away) < least:
-            best, least = replace(start, V=V), (int(lost), away)
-    if best is None:
+        if positive and missed_volume(optimizer.V, H, solid.surface) <= MOST_MISSED:
+            sound.append((away, replace(start, V=optimizer.V)))
+        else:
+            lost.append((away, start))
+    if not sound and not lost:
         raise SolverError(f"no grid could be begun with: {failure}") from failure
-    return best
+    ranked = sorted(sound or lost, key=lambda pair: pair[0])
+    return [start for _, start in ranked[: _KEPT if sound else 1]]
 
 
 def equal_axes(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,11 +11,12 @@ import stretchmap as sm
 from shapes import a_map
 from stretchmap import _core
 from stretchmap.errors import SolverError
+from stretchmap.resample import hexes
 from stretchmap.resample import start as module
 from stretchmap.resample.optimize import GridOptimizer
 from stretchmap.resample.quality import boundary_distances, boundary_quads, missed_volume
 from stretchmap.resample.sizes import grid_candidates
-from stretchmap.resample.start import best_start, pulled_back
+from stretchmap.resample.start import best_starts, pulled_back
 
 
 def a_ring():
@@ -31,11 +32,11 @@ def test_of_several_the_one_closest_to_the_surface_is_gone_on_with():
         return max(found)
 
     candidates = [(6, 1, 1), (16, 3, 1), (8, 2, 1)]
-    best = best_start(result, solid, candidates)
+    best = best_starts(result, solid, candidates)[0]
     assert best.numbers == (16, 3, 1)
     assert np.array_equal(best.pulled, pulled_back(result, best.numbers).V)
     assert away(best) < min(
-        away(best_start(result, solid, [numbers] * 2)) for numbers in candidates[::2]
+        away(best_starts(result, solid, [numbers])[0]) for numbers in candidates[::2]
     )
 
 
@@ -49,9 +50,42 @@ def test_a_candidate_that_breaks_down_is_passed_over(monkeypatch):
         return real(self, schedule, progress)
 
     monkeypatch.setattr(module.GridOptimizer, "run", run)
-    assert best_start(result, solid, [(6, 1, 1), (8, 2, 1)]).numbers == (8, 2, 1)
+    assert best_starts(result, solid, [(6, 1, 1), (8, 2, 1)])[0].numbers == (8, 2, 1)
     with pytest.raises(SolverError, match="no grid could be begun with: broke down"):
-        best_start(result, solid, [(6, 1, 1), (6, 1, 1)])
+        best_starts(result, solid, [(6, 1, 1), (6, 1, 1)])
+
+
+def test_of_the_two_closest_the_one_that_ends_closer_is_returned(monkeypatch):
+    """Of two within the tolerance, the better shaped; one that fails leaves the other."""
+    result, solid = a_ring()
+    starts = best_starts(result, solid, [(6, 1, 1), (16, 3, 1), (8, 2, 1)])
+    assert len(starts) == 2
+    alone = [hexes._best_optimized([start], solid, None) for start in starts]
+
+    def quality(start):
+        H = start.layout.H
+        away = max(boundary_distances(start.V, boundary_quads(H), solid.surface))
+        return away, _core.resample.scaled_jacobians(start.V, H).min()
+
+    closer, farther = sorted(alone, key=lambda start: quality(start)[0])
+    better = max(alone, key=lambda start: quality(start)[1])
+    for close, alike, expected in ((0.0, 1.0, closer), (0.0, 1e9, better), (1.0, 1.0, better)):
+        monkeypatch.setattr(hexes, "_CLOSE", close)
+        monkeypatch.setattr(hexes, "_ALIKE", alike)
+        for order in (starts, starts[::-1]):
+            assert hexes._best_optimized(order, solid, None).numbers == expected.numbers
+
+    real = hexes._optimized
+
+    def fails(V, H, *rest):
+        if len(H) == len(closer.layout.H):
+            raise SolverError("not valid", [3])
+        return real(V, H, *rest)
+
+    monkeypatch.setattr(hexes, "_optimized", fails)
+    assert hexes._best_optimized(starts, solid, None).numbers == farther.numbers
+    with pytest.raises(SolverError, match="not valid"):
+        hexes._best_optimized([closer], solid, None)
 
 
 def stretched(solid, length):
@@ -81,7 +115,7 @@ def test_what_lost_the_surface_is_not_gone_on_with():
     found = sm.volume_map(solid)
     long = stretched(solid, 30.0)
     result = a_map(long, found.image, found.torus)
-    start = best_start(result, long, [(24, 2, 1)])
+    start = best_starts(result, long, [(24, 2, 1)])[0]
     assert np.array_equal(start.V, start.pulled)
     optimizer = GridOptimizer(start.V, start.layout.H, long.surface)
     optimizer.run(module._TRIAL)
