@@ -26,6 +26,8 @@ _log = logging.getLogger("stretchmap")
 _STEPS, _TOL = 100, 0.05
 _SEM_STEPS = 10
 _GENTLE = SHAPES[2:]  # lighter ones leave folds, which opened become needles
+_LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a limb
+_KEPT = 1e-8  # of its area, by a face that is not lost
 
 
 def boundary_starts(
@@ -124,20 +126,29 @@ class _BoundaryMaps:
         return None if self.first.certificate.certified else self.first
 
     def fatter(self) -> AreaMap:
-        found = self._chart(self.fatter_ratio)
-        if found.certificate.certified:
-            return found
-        return finished(found, max_iter=0, tol=_TOL, progress=self.progress)
+        return self._unfolded(self.fatter_ratio)
 
     def gentle(self, ratio: Ratio | float) -> AreaMap | None:
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
-        maps = (self._chart(ratio, shape) for shape in _GENTLE)
-        return next((found for found in maps if found.certificate.certified), None)
+        certified = False
+        for shape in _GENTLE:
+            found = self._chart(ratio, shape)
+            if found.certificate.certified:
+                certified = True
+                if found.distortion.ratios.min() > _KEPT:
+                    return found
+        return self._unfolded(ratio, _LIGHTER) if certified else None
 
     def gentle_finished(self) -> AreaMap | None:
         found = self.gentle(self.ratio)
         return found and finished(found, max_iter=_STEPS, tol=_TOL, progress=self.progress)
+
+    def _unfolded(self, ratio: float | Ratio, shape: float = 0.0) -> AreaMap:
+        found = self._chart(ratio, shape)
+        if found.certificate.certified:
+            return found
+        return finished(found, max_iter=0, tol=_TOL, progress=self.progress)
 
     def _chart(self, ratio: Ratio | float, shape: float = 0.0) -> AreaMap:
         steps = Steps(0, _TOL, math.inf)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -82,3 +83,20 @@ def test_a_start_that_cannot_be_made_is_passed_over(monkeypatch):
         monkeypatch.setattr(maps, name, fails)
     with pytest.raises(SolverError, match="flipped in the chart"):
         next(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
+
+
+def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch, plain):
+    def chart(least):
+        def made(_, ratio, shape=0.0):
+            kept = SimpleNamespace(ratios=np.array([1.0, least]))
+            certified = SimpleNamespace(certified=shape != 10.0)
+            return SimpleNamespace(ratio=ratio, shape=shape, certificate=certified, distortion=kept)
+
+        return made
+
+    maps = boundary_starts_module._BoundaryMaps(SOLID.surface, VolumeOptions(), None)
+    monkeypatch.setattr(boundary_starts_module, "finished", lambda found, **_: (found.shape,))
+    monkeypatch.setattr(type(maps), "_chart", chart(1e-3))
+    assert maps.gentle(2.0).shape == 100.0
+    monkeypatch.setattr(type(maps), "_chart", chart(1e-20))
+    assert maps.gentle(2.0) == (10.0,)
