@@ -216,6 +216,7 @@ def _certified_map(
             begin.problem, options, glide=glide, budget=budget, patience=share, progress=progress
         )
         outcome.seconds["start"] += begin.seconds
+        vain += begin.others
         found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
         if best is None or _better(found, best):
             best = found
