@@ -2,7 +2,9 @@
 
 Botsch, Kobbelt (SGP 2004): edges are split, collapsed and flipped towards one length, vertices
 move within the surface. An edge is collapsed only where that keeps the surface a manifold, so the
-genus stays what it was.
+genus stays what it was. Long edges are split first: vertices move to the mean of their neighbors,
+which at the end of a long edge are far away, so that surfaces of long, thin triangles, as CAD gives
+them, would fold and shrink.
 """
 
 from __future__ import annotations
@@ -10,10 +12,15 @@ from __future__ import annotations
 import importlib.util
 import math
 
+import numpy as np
+
 from ..errors import MissingDependencyError, SolverError
 from ..mesh.meshes import TriMesh
+from .split import split_long_edges
 
-__all__ = ["even"]
+__all__ = ["even", "has_long_edges"]
+
+_LONG = 4.0  # of an edge that is split, over the edges aimed at
 
 
 def even(surface: TriMesh, faces: int, iterations: int = 10) -> TriMesh:
@@ -46,10 +53,17 @@ def even(surface: TriMesh, faces: int, iterations: int = 10) -> TriMesh:
     from gpytoolbox import remesh_botsch
 
     edge = math.sqrt(surface.area / faces * 4.0 / math.sqrt(3.0))
-    V, F = remesh_botsch(surface.V.copy(), surface.F.copy(), iterations, edge, True)
+    halved = split_long_edges(surface, _LONG * edge)
+    V, F = remesh_botsch(halved.V.copy(), halved.F.copy(), iterations, edge, True)
     after = TriMesh(V, F, orient=True)
     diagnosis = after.diagnose()
     if not diagnosis.ok or after.genus != surface.genus:
         found = ", ".join(d.name for d in diagnosis.defects) or f"genus {after.genus}"
         raise SolverError(f"remeshing to {faces} faces changed the surface ({found})")
     return after
+
+
+def has_long_edges(surface: TriMesh, edge: float) -> bool:
+    """Whether edges are split before a surface is remeshed to edges of a length."""
+    ends = surface.V[surface.edges]
+    return bool(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).max() > _LONG * edge)

@@ -23,7 +23,7 @@ from ..errors import (
 from ..mesh.given import as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.tetrahedralize import tetrahedralize
-from .even import even
+from .even import even, has_long_edges
 from .handles import HandleCut, cut_handles
 from .holes import close_holes, crossings, remove_crossings
 from .rebuild import rebuilt
@@ -39,6 +39,7 @@ _WORKING_FACES = 50_000  # handles are looked for on no more than about that man
 _WORKING_ITERATIONS = 3
 _TET = 2.0  # largest tet, in regular tets over the boundary's mean edge
 _REMESHINGS = 3
+_FINER = (1.5, 2.0, 3.0)  # times the faces aimed at
 _REBUILT_FACES = 16_000
 _BYTES_PER_FACE = 5e3  # of the boundary, tets included; measured
 
@@ -194,35 +195,26 @@ class _Run:
         return whole, cuts
 
     def remesh(self, surface: TriMesh, faces: int) -> tuple[TriMesh, float, bool]:
-        """Even triangles that do not cross, their edge length, and whether there are any.
-
-        What crosses is cut out and the rest remeshed again.
-        """
+        """Even triangles that do not cross, their edge length, and whether there are any."""
         self.announce("remesh")
-        removed, before = 0, surface
-        for _ in range(_REMESHINGS):
-            smooth = even(surface, faces)
-            if not len(crossings(smooth)):
-                self.done("remesh", {"faces": smooth.n_faces, "crossing_faces_removed": removed})
-                return smooth, _mean_edge(smooth), True
-            try:
-                mended, counts = remove_crossings(smooth)
-            except (SelfIntersectionError, ConnectivityError):  # or cut in two
-                break
-            removed += counts["removed"]
-            if mended.genus != surface.genus:
-                break
-            surface = mended
-        else:
-            self.done("remesh", {"faces": mended.n_faces, "crossing_faces_removed": removed})
-            return mended, _mean_edge(mended), True
-        if not self._rescue and self._filler != "ftetwild":
-            raise SelfIntersectionError(
-                f"with {faces} faces the surface crosses itself where it is thin; ask for more "
-                "faces, or install pytetwild, which fills it all the same"
-            )
-        self.done("remesh", {"given_up": 1})
-        return before, _edge_of(before, faces), False
+        try:
+            smooth, removed = _remeshed(surface, faces)
+        except (SolverError, SelfIntersectionError, ConnectivityError) as error:
+            finer = _finer(surface, faces)
+            if finer is not None:
+                self.done("remesh", {"faces": finer.n_faces, "more_than_asked": 1})
+                return finer, _mean_edge(finer), True
+            if not self._rescue and self._filler != "ftetwild":
+                if isinstance(error, SolverError):
+                    raise
+                raise SelfIntersectionError(
+                    f"with {faces} faces the surface crosses itself where it is thin; ask for "
+                    "more faces, or install pytetwild, which fills it all the same"
+                ) from error
+            self.done("remesh", {"given_up": 1})
+            return surface, _edge_of(surface, faces), False
+        self.done("remesh", {"faces": smooth.n_faces, "crossing_faces_removed": removed})
+        return smooth, _mean_edge(smooth), True
 
     def fill(self, surface: TriMesh, edge: float, is_even: bool) -> TetMesh:
         """Tets inside, whose boundary edges are about so long."""
@@ -240,6 +232,40 @@ class _Run:
         else:
             self.done("fill", {"tets": solid.n_tets})
         return solid
+
+
+def _remeshed(surface: TriMesh, faces: int) -> tuple[TriMesh, int]:
+    """Even triangles that do not cross, and how many faces that did were cut out.
+
+    What crosses is cut out and the rest remeshed again, which fails where it is thin.
+    """
+    removed, genus = 0, surface.genus
+    for _ in range(_REMESHINGS):
+        smooth = even(surface, faces)
+        if not len(crossings(smooth)):
+            return smooth, removed
+        surface, counts = remove_crossings(smooth)
+        removed += counts["removed"]
+        if surface.genus != genus:
+            raise SelfIntersectionError("what crosses holds a handle", [])
+    return surface, removed
+
+
+def _finer(surface: TriMesh, faces: int) -> TriMesh | None:
+    """Where edges are long, more even triangles than asked for that do not cross, if there are.
+
+    The long, thin triangles themselves would keep fTetWild busy for hours.
+    """
+    if not has_long_edges(surface, _edge_of(surface, faces)):
+        return None
+    for more in _FINER:
+        try:
+            smooth = even(surface, int(more * faces))
+        except SolverError:
+            continue
+        if not len(crossings(smooth)):
+            return smooth
+    return None
 
 
 def _edge_of(surface: TriMesh, faces: int) -> float:
