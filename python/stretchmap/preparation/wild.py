@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import math
 import re
 import subprocess
 import sys
@@ -25,6 +26,8 @@ from .soup import labels
 __all__ = ["chosen_filler", "fill_within_envelope", "has_ftetwild", "run_ftetwild"]
 
 _ENVELOPE = 5e-4  # of the diagonal of the bounding box
+_SECONDS = 60.0  # given to any surface, and
+_SECONDS_PER_FACE = 0.05  # twenty-five times what even ones take
 _SCRIPT = """
 import json, sys, numpy, pytetwild
 data = numpy.load("surface.npz")
@@ -80,7 +83,8 @@ def fill_within_envelope(surface: TriMesh, edge: float) -> TetMesh:
     MissingDependencyError
         If ``pytetwild`` is not installed.
     SolverError
-        If it gives up, or nothing is inside.
+        If it gives up, or nothing is inside, or it takes longer than a minute and a twentieth
+        of a second per boundary face aimed at: among long, thin triangles it may go on for hours.
     """
     if not has_ftetwild():
         raise MissingDependencyError(
@@ -88,7 +92,8 @@ def fill_within_envelope(surface: TriMesh, edge: float) -> TetMesh:
             "pip install 'stretchmap[prepare]'"
         )
     options = {"edge_length_abs": edge, "epsilon": _ENVELOPE, "simplify": False}
-    V, T = run_ftetwild(surface, options)
+    aimed = surface.area / (math.sqrt(3.0) / 4.0 * edge**2)
+    V, T = run_ftetwild(surface, options, _SECONDS + _SECONDS_PER_FACE * aimed)
     try:
         return _largest(TetMesh(V, T, orient=True))
     except MeshError as error:
@@ -96,26 +101,32 @@ def fill_within_envelope(surface: TriMesh, edge: float) -> TetMesh:
 
 
 def run_ftetwild(
-    surface: TriMesh, options: dict[str, Any]
+    surface: TriMesh, options: dict[str, Any], seconds: float | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Points and tets as pytetwild makes them of a surface, on one thread.
 
     In a process and a folder of its own: what it meets on the way may abort it, and it leaves files
-    where it runs.
+    where it runs. It ends with the call, on an interrupt too.
 
     Raises
     ------
     SolverError
-        If it gives up.
+        If it gives up, or is not done after so many seconds.
     MissingDependencyError
         If something it needs is not installed.
     """
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
-        run = subprocess.run(
-            [sys.executable, "-c", _SCRIPT, json.dumps(options)],
-            cwd=folder, capture_output=True, text=True, errors="replace", check=False,
-        )  # fmt: skip
+        try:
+            run = subprocess.run(
+                [sys.executable, "-c", _SCRIPT, json.dumps(options)], timeout=seconds,
+                cwd=folder, capture_output=True, text=True, errors="replace", check=False,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired as error:
+            raise SolverError(
+                f"fTetWild was not done with {surface.n_faces} faces after {seconds:.0f} seconds; "
+                "ask for fewer faces, split long, thin triangles, or fill with tetgen"
+            ) from error
         out = Path(folder, "solid.npz")
         if run.returncode or not out.exists():
             said = run.stderr.strip().splitlines() or ["no reason given"]
