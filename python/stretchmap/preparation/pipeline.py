@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -34,6 +35,9 @@ from .wild import chosen_filler, fill_within_envelope, has_ftetwild
 
 __all__ = ["prepare"]
 
+_log = logging.getLogger("stretchmap")
+
+_MUCH = 0.1  # of the volume, to be lost without a word
 _WELD = 1e-7  # share of the longest side of the bounding box
 _WORKING_FACES = 50_000  # handles are looked for on no more than about that many
 _WORKING_ITERATIONS = 3
@@ -134,11 +138,12 @@ def prepare(
     V, F = run.arrays("debris", keep_largest, V, F)
     V, F = run.arrays("holes", close_holes, V, F)
     closed = TriMesh(V, F)
+    volume = closed.volume
     if closed.n_faces > 1.3 * max(_WORKING_FACES, 2 * faces):
         closed = run.coarsen(closed, max(_WORKING_FACES, 2 * faces))
     sound = run.uncross(closed)
     whole, cuts = run.cut(sound, genus, max_cut)
-    solid = run.fill(*run.remesh(whole, faces))
+    solid = run.fill(*run.remesh(whole, faces), of_volume=volume)
     if solid.surface.genus != genus:
         raise GenusError(f"the solid has genus {solid.surface.genus}, {genus} was wanted")
     solid.require_solid_torus() if genus == 1 else solid.diagnose().require()
@@ -216,7 +221,7 @@ class _Run:
         self.done("remesh", {"faces": smooth.n_faces, "crossing_faces_removed": removed})
         return smooth, _mean_edge(smooth), True
 
-    def fill(self, surface: TriMesh, edge: float, is_even: bool) -> TetMesh:
+    def fill(self, surface: TriMesh, edge: float, is_even: bool, *, of_volume: float) -> TetMesh:
         """Tets inside, whose boundary edges are about so long."""
         self.announce("fill")
         solid = None
@@ -228,9 +233,17 @@ class _Run:
                     raise SolverError(f"{error}; ask for more faces", error.ids) from error
         if solid is None:
             solid = fill_within_envelope(surface, edge)
-            self.done("fill", {"tets_by_ftetwild": solid.n_tets})
+            counts = {"tets_by_ftetwild": float(solid.n_tets)}
         else:
-            self.done("fill", {"tets": solid.n_tets})
+            counts = {"tets": float(solid.n_tets)}
+        lost = 1.0 - solid.volume / of_volume
+        self.done("fill", {**counts, "percent_of_volume_lost": round(100.0 * lost, 2)})
+        if lost > _MUCH:
+            _log.warning(
+                "prepare: %.0f %% of the volume is lost where the solid is thinner than its "
+                "triangles are long; ask for more faces",
+                100.0 * lost,
+            )
         return solid
 
 

@@ -250,7 +250,7 @@ def test_ftetwild_fills_where_it_is_wanted_or_alone(installed, monkeypatch):
         done = sm.prepare(torus, faces=1_000)
         with pytest.raises(MissingDependencyError, match="pytetwild"):
             sm.prepare(torus, faces=1_000, filler="tetgen")
-    assert steps(done)["fill"] == {"tets_by_ftetwild": done.solid.n_tets}
+    assert steps(done)["fill"]["tets_by_ftetwild"] == done.solid.n_tets
     done.solid.require_solid_torus()
     assert done.solid.volume == pytest.approx(torus.volume, rel=0.04)  # 1,000 faces: 0.02
     assert sm.volume_map(done.solid).certificate.certified

@@ -82,3 +82,14 @@ def test_more_faces_are_used_where_so_few_would_cross(monkeypatch):
     counts = {step.name: dict(step.counts) for step in done.steps}["remesh"]
     assert counts["more_than_asked"] == 1 and 2_200 < counts["faces"] == done.surface.n_faces
     assert done.solid.volume == pytest.approx(given.volume, rel=0.06)
+
+
+@pytest.mark.parametrize(("thickness", "much"), [(0.03, True), (0.5, False)])
+def test_what_remeshing_costs_of_the_volume_is_told(caplog, thickness, much):
+    disc = pipe(48, thickness, 1.0, 0.4)
+    done = sm.prepare(disc, faces=1_000)
+    lost = done.steps[-1].counts["percent_of_volume_lost"]
+    assert lost == pytest.approx(100.0 * (1.0 - done.solid.volume / disc.volume), abs=0.01)
+    assert (lost > 10.0) == much
+    assert ("of the volume is lost" in caplog.text) == much
+    assert "percent of volume lost" in done.summary()
