@@ -18,7 +18,9 @@ from ..errors import SolverError
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-# Factors by which weights fall from edge to edge outward on what the flat map has lost.
+_EMBEDDINGS = 6  # with weights that fall where areas fall
+_LEAST_BY_AREAS = 1e-12
+# Factors by which weights fall from edge to edge outward on what those have lost all the same.
 _FALLS = (0.5, 0.2, 0.1, 0.05, 0.03, 0.02, 0.01)
 _LEAST_WEIGHT = 1e-250
 _LEAST_AREA = 1e-30  # of a face in the chart: rounding moves its corners by 1e-16
@@ -37,28 +39,44 @@ def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.floa
     if (_core.area.turn_areas(chart, conformal.turns) > 0.0).all():
         return conformal.turns
     forms = conformal.forms.astype(float)
-    weights = np.ones(len(surface.edges))
-    steps, folded = np.empty(0), np.empty(0, np.intp)
-    for fall in (1.0, *_FALLS):
-        if fall < 1.0:
-            weights = np.maximum(fall, _LEAST_WEIGHT ** (1.0 / max(steps.max(), 1.0))) ** steps
-        # Vertex 0 is held: if but small weights joined it to the rest, all else would be rounding.
-        held = int(np.argmax(np.bincount(surface.edges.ravel(), np.repeat(weights, 2))))
-        swap = np.arange(len(surface.V), dtype=np.int32)
-        swap[[0, held]] = held, 0
-        turns = _core.forms.harmonic_forms(len(swap), swap[surface.edges], weights, forms)[1][swap]
+    share = surface.face_areas / surface.face_areas.sum()
+    weights, kept = np.ones(len(surface.edges)), None
+    areas = np.zeros_like(share)
+    for _ in range(_EMBEDDINGS):
+        turns = _embedded(surface, weights, forms)
         areas = _core.area.turn_areas(chart, turns)
-        folded = np.flatnonzero(~(areas > _LEAST_AREA))
-        if not len(folded):
+        if (areas > _LEAST_AREA).all():
             return turns
-        if fall == 1.0:
-            kept = areas > _SAFE * surface.face_areas / surface.face_areas.sum()
-            steps = _steps_from(surface, np.unique(surface.F[kept]))
+        kept = areas > _SAFE * share if kept is None else kept
+        stretch = np.repeat(np.sqrt(np.maximum(areas, 0.0) / share), 3)
+        stretch = np.bincount(surface.topology.edge, stretch, len(weights))
+        weights = np.maximum(stretch, _LEAST_BY_AREAS)
+    steps = _steps_from(surface, np.unique(surface.F[kept]))
+    for fall in _FALLS:
+        weights = np.maximum(fall, _LEAST_WEIGHT ** (1.0 / max(steps.max(), 1.0))) ** steps
+        turns = _embedded(surface, weights, forms)
+        areas = _core.area.turn_areas(chart, turns)
+        if (areas > _LEAST_AREA).all():
+            return turns
+    folded = np.flatnonzero(~(areas > _LEAST_AREA))
     raise SolverError(
         f"{describe('face', folded)} lie so far out on a long, thin limb that a flat map "
         "shrinks them to nothing: cut the limb short or remesh it coarser",
         folded,
     )
+
+
+def _embedded(
+    surface: TriMesh, weights: NDArray[np.float64], forms: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Turns (n, 2) of the harmonic map with these weights of edges."""
+    # Vertex 0 is held: if but small weights joined it to the rest, all else would be rounding.
+    held = int(np.argmax(np.bincount(surface.edges.ravel(), np.repeat(weights, 2))))
+    swap = np.arange(len(surface.V), dtype=np.int32)
+    swap[[0, held]] = held, 0
+    turns: NDArray[np.float64]
+    turns = _core.forms.harmonic_forms(len(swap), swap[surface.edges], weights, forms)[1][swap]
+    return turns
 
 
 def _steps_from(surface: TriMesh, vertices: NDArray[np.int32]) -> NDArray[np.float64]:

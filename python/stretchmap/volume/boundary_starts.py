@@ -7,6 +7,8 @@ import logging
 import math
 from collections.abc import Callable, Iterable, Iterator
 
+import numpy as np
+
 from ..area.finish import Steps
 from ..area.map import SHAPES, along, finished
 from ..area.result import AreaMap
@@ -27,7 +29,7 @@ _STEPS, _TOL = 100, 0.05
 _SEM_STEPS = 10
 _GENTLE = SHAPES[2:]  # lighter ones leave folds, which opened become needles
 _LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a limb
-_KEPT = 1e-8  # of its area, by a face that is not lost
+_LOST = 1e-16  # of its area a face has no more
 
 
 def boundary_starts(
@@ -131,14 +133,14 @@ class _BoundaryMaps:
     def gentle(self, ratio: Ratio | float) -> AreaMap | None:
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
-        certified = False
+        lost = False
         for shape in _GENTLE:
             found = self._chart(ratio, shape)
-            if found.certificate.certified:
-                certified = True
-                if found.distortion.ratios.min() > _KEPT:
-                    return found
-        return self._unfolded(ratio, _LIGHTER) if certified else None
+            ratios = np.abs(found.distortion.ratios)
+            lost = lost or ratios.min() < _LOST
+            if found.certificate.certified and ratios.min() >= _LOST:
+                return found
+        return self._unfolded(ratio, _LIGHTER) if lost else None
 
     def gentle_finished(self) -> AreaMap | None:
         found = self.gentle(self.ratio)

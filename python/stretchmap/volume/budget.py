@@ -30,7 +30,12 @@ class Budget:
 
     def share(self, part: float) -> Budget:
         """A part of what is left."""
-        return Budget(part * max(self._end - time.process_time(), 0.0))
+        return Budget(part * self.left)
+
+    @property
+    def left(self) -> float:
+        """Seconds."""
+        return max(self._end - time.process_time(), 0.0)
 
     @property
     def spent(self) -> bool:

@@ -43,6 +43,9 @@ _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 _LARGE = 1_000_000
 # Share of the time left that untangling may take, from each start; half of it if that is folded.
 _PATIENCE: tuple[float, ...] = (0.4, 0.6, 0.6, 0.6, 1.0)
+# From a start that has been compared with others: there hardly is a better one.
+_PATIENCE_WITH_BEST = 0.8
+_WORTH_A_START = 0.1  # share of the time; with less left no further one is made
 
 
 @takes_threads
@@ -205,11 +208,14 @@ def _certified_map(
     """The map from the first start that leads to a certified one, or the best there is."""
     budget = Budget.of(options, solid.n_tets)
     if start is None:
-        starts, patience = ranked_starts(solid, options, glide=glide, progress=progress), _PATIENCE
+        starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)
+        patience = _PATIENCE
     else:
         starts, patience = iter([Start(start, _problem(solid, start, options))]), (1.0,)
     best, clock, vain = None, time.perf_counter(), 0.0
     for begin, share in zip(starts, patience, strict=False):
+        if begin.others:
+            share = _PATIENCE_WITH_BEST
         if start is None and not _unfolded(begin.map):
             share *= 0.5
         outcome = solve(
@@ -220,7 +226,7 @@ def _certified_map(
         found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
         if best is None or _better(found, best):
             best = found
-        if best.certificate.certified or budget.spent:
+        if best.certificate.certified or budget.left < _WORTH_A_START * budget.seconds:
             break
         if not best.certificate.checks.get("source_embedded", True):
             break  # no start mends the source

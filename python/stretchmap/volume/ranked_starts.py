@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from ..base.progress import Progress
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .boundary_starts import boundary_starts
+from .budget import Budget
 from .options import VolumeOptions
 from .problem import VolumeProblem
 from .start import START_TOL, started
@@ -24,6 +24,7 @@ __all__ = ["Start", "ranked_starts"]
 # in which they are made: of a thin shell it is a fifth from one, and a thousandth from another.
 _MANY = 0.05
 _COMPARED = 4
+_COMPARING = 0.3  # share of the time left that may go into them, each as dear as the first
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,12 @@ class Start:
 
 
 def ranked_starts(
-    solid: TetMesh, options: VolumeOptions, *, glide: bool, progress: Progress | None
+    solid: TetMesh,
+    options: VolumeOptions,
+    budget: Budget,
+    *,
+    glide: bool,
+    progress: Progress | None,
 ) -> Iterator[Start]:
     """Those of `boundary_starts`; if the first turns many tets over, the best of a few comes first.
 
@@ -60,9 +66,14 @@ def ranked_starts(
     starts = begun()
     first = next(starts)
     if glide and first.inverted > _MANY:
-        clock = time.perf_counter()
-        few = [first, *itertools.islice(starts, _COMPARED - 1)]
-        spent = time.perf_counter() - clock
+        made, allowed = budget.seconds - budget.left, budget.share(_COMPARING)
+        few, clock = [first], time.perf_counter()
+        while len(few) < _COMPARED and allowed.left > made:
+            other = next(starts, None)
+            if other is None:
+                break
+            few.append(other)
+        spent = time.perf_counter() - clock if len(few) > 1 else 0.0
         best, *rest = sorted(few, key=lambda start: start.inverted)
         yield replace(best, others=spent)
         yield from rest

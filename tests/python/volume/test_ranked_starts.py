@@ -13,6 +13,7 @@ from stretchmap.errors import SolverError
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import ranked_starts as module
 from stretchmap.volume.boundary_starts import boundary_starts
+from stretchmap.volume.budget import Budget
 from stretchmap.volume.options import VolumeOptions
 
 SOLID = sm.samples.bumpy_torus(2000)
@@ -29,7 +30,9 @@ def twisted(plain: sm.AreaMap, by: float) -> sm.AreaMap:
     return dataclasses.replace(plain, image=plain.torus.xi(u + by * np.sin(v), v))
 
 
-def ranked(monkeypatch, maps: list[sm.AreaMap], *, glide: bool = True) -> tuple[list, list]:
+def ranked(
+    monkeypatch, maps: list[sm.AreaMap], *, glide: bool = True, seconds: float = 600.0
+) -> tuple[list, list]:
     """Maps in the order tried, and how many had been made when the first was."""
     made, known, order = [], [], []
 
@@ -39,7 +42,8 @@ def ranked(monkeypatch, maps: list[sm.AreaMap], *, glide: bool = True) -> tuple[
             yield found
 
     monkeypatch.setattr(module, "boundary_starts", starts)
-    for start in module.ranked_starts(SOLID, VolumeOptions(), glide=glide, progress=None):
+    budget = Budget(seconds)
+    for start in module.ranked_starts(SOLID, VolumeOptions(), budget, glide=glide, progress=None):
         known.append(len(made))
         order.append(start.map)
     return order, known
@@ -56,6 +60,12 @@ def test_one_that_turns_many_over_waits_for_better_ones(monkeypatch, plain):
     order, known = ranked(monkeypatch, [bad, worse, plain, bad, last])
     assert [id(found) for found in order] == [id(k) for k in (plain, bad, bad, worse, last)]
     assert known[0] == 4  # the last is made only when all others have led nowhere
+
+
+def test_comparing_ends_with_the_starts_and_with_its_share_of_the_time(monkeypatch, plain):
+    maps = [twisted(plain, 3.0), plain]
+    assert ranked(monkeypatch, maps)[0] == maps[::-1]
+    assert ranked(monkeypatch, maps, seconds=0.0)[0] == maps
 
 
 def test_exact_areas_come_first_where_the_boundary_is_held(monkeypatch, plain):
