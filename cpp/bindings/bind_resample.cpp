@@ -84,16 +84,18 @@ void bind(py::module_& m) {
       .def(
           "run",
           [](HexNewton& self, Points x, const volume::EnergyWeights& corner, double power,
-             int max_steps, double least_gain, double tol) {
+             int max_steps, double least_gain, double tol, const std::string& preconditioner) {
             HexNewtonOptions options;
             options.max_steps = max_steps;
             options.least_gain = least_gain;
             options.tol = tol;
+            options.preconditioner = preconditioner;
             const HexNewtonReport report = self.run(x, {corner, power}, options, signal_poll());
             return std::make_pair(std::move(x), report);
           },
           py::arg("x"), py::arg("corner"), py::arg("power"), py::arg("max_steps"),
-          py::arg("least_gain") = 1e-3, py::arg("tol") = 0.1, release_gil());
+          py::arg("least_gain") = 1e-3, py::arg("tol") = 0.1,
+          py::arg("preconditioner") = "multigrid", release_gil());
 }
 
 }  // namespace stretchmap::resample

@@ -73,23 +73,27 @@ Vec equal_area_from_angle(const VecRef& v, double tube_ratio) {
   return v.array() + tube_ratio * v.array().sin();
 }
 
+double equal_area_angle(double s, double tube_ratio, double guess) {
+  double low = -0.5 * kTwoPi, high = 0.5 * kTwoPi, x = guess;
+  for (int iteration = 0; iteration < 80; ++iteration) {
+    const double residual = x + tube_ratio * std::sin(x) - s;
+    (residual > 0.0 ? high : low) = x;
+    double next = x - residual / (1.0 + tube_ratio * std::cos(x));
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    const double change = std::abs(next - x);
+    x = next;
+    if (change <= 4e-16 * (1.0 + std::abs(x))) break;
+  }
+  return x;
+}
+
 Vec angle_from_equal_area(const VecRef& s, double tube_ratio) {
   Vec v(s.size());
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < static_cast<Index>(s.size()); ++i) {
     const double whole = kTwoPi * std::round(s(i) / kTwoPi);
-    const double t = s(i) - whole;  // in [-pi, pi], and so is the solution
-    double low = -0.5 * kTwoPi, high = 0.5 * kTwoPi, x = t / (1.0 + tube_ratio);
-    for (int iteration = 0; iteration < 80; ++iteration) {
-      const double residual = x + tube_ratio * std::sin(x) - t;
-      (residual > 0.0 ? high : low) = x;
-      double next = x - residual / (1.0 + tube_ratio * std::cos(x));
-      if (!(next > low && next < high)) next = 0.5 * (low + high);
-      const double change = std::abs(next - x);
-      x = next;
-      if (change <= 4e-16 * (1.0 + std::abs(x))) break;
-    }
-    v(i) = x + whole;
+    const double t = s(i) - whole;
+    v(i) = equal_area_angle(t, tube_ratio, t / (1.0 + tube_ratio)) + whole;
   }
   return v;
 }

@@ -1,6 +1,5 @@
 #include "stretchmap/area/surface_energy.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -129,7 +128,7 @@ void add_shape(const Jet& d, const Jet& a, double weight, bool second, Jet& sum)
 void make_convex(SixSix& matrix) {
   const double size = matrix.diagonal().cwiseAbs().maxCoeff();
   const SixSix shifted = matrix + 1e-12 * size * SixSix::Identity();
-  if (Eigen::LLT<SixSix>(shifted).info() == Eigen::Success) return;
+  if (linalg::is_positive_definite(shifted)) return;
   matrix =
       linalg::map_eigenvalues(matrix, [](double value, double) { return std::max(value, 0.0); });
 }

@@ -76,10 +76,16 @@ namespace {
 class TubeTable {
  public:
   explicit TubeTable(double ratio) : points_(kEntries + 1, 2) {
-    const Vec s = Vec::LinSpaced(kEntries + 1, 0.0, kTwoPi);
-    const Eigen::ArrayXd v = angle_from_equal_area(s, 1.0 / ratio).array();
-    points_.col(0) = v.cos();
-    points_.col(1) = v.sin();
+    const double tube = 1.0 / ratio, step = kTwoPi / kEntries;
+    points_.row(0) << 1.0, 0.0;
+    double v = 0.0;
+    for (Index i = 1; i <= kEntries / 2; ++i) {
+      const double slope = 1.0 + tube * points_(i - 1, 0);
+      v = equal_area_angle(step * i, tube, v + step / slope);
+      points_.row(i) << std::cos(v), std::sin(v);
+      points_.row(kEntries - i) << points_(i, 0), -points_(i, 1);
+    }
+    points_.row(kEntries) = points_.row(0);
   }
   Eigen::RowVector2d at(double turns) const {
     const double x = kEntries * (turns - std::floor(turns));

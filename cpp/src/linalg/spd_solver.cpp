@@ -6,7 +6,6 @@
 
 #include "linalg/direct/cholesky.hpp"
 #include "linalg/direct/cholmod.hpp"
-#include "linalg/direct/refined_solve.hpp"
 #include "linalg/iterative.hpp"
 #include "stretchmap/base/errors.hpp"
 
@@ -135,10 +134,7 @@ PcgResult<K> SpdSolver::State::columns(const RowsRef& B, Eigen::Ref<Rows>& X, In
   Columns b = Columns::Zero(B.rows(), K), x(B.rows(), K);
   b.leftCols(used) = B.middleCols(first, used);
   const PcgResult<K> result = cholesky ? cholesky->template solve<K>(A, b.data(), x.data(), options)
-                                       : refined_solve<K>(A, b.data(), x.data(), options,
-                                                          [&](const double* from, double* to) {
-                                                            cholmod->substitute(from, to, K);
-                                                          });
+                                       : cholmod->template solve<K>(A, b.data(), x.data(), options);
   X.middleCols(first, used) = x.leftCols(used);
   return result;
 }

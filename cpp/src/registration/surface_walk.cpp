@@ -1,5 +1,7 @@
 #include "stretchmap/registration/surface_walk.hpp"
 
+#include <cmath>
+
 namespace stretchmap::registration {
 
 bool SurfaceWalk::point(const Eigen::RowVector2d& y, Eigen::RowVector3d& x) const {
@@ -18,7 +20,11 @@ Eigen::Matrix2d SurfaceWalk::steps(const Eigen::RowVector2d& y) const {
   J << row[0], row[1], row[2], row[3], row[4], row[5];
   const Eigen::Matrix2d metric = J.transpose() * J;
   // metric = L L^T: the columns of L^-T have unit length on the face and are orthogonal there.
-  return metric.llt().matrixU().solve(Eigen::Matrix2d::Identity());
+  const double a = std::sqrt(metric(0, 0)), b = metric(1, 0) / a;
+  const double c = std::sqrt(metric(1, 1) - b * b);
+  Eigen::Matrix2d inverse;
+  inverse << 1.0 / a, -b * (1.0 / c) / a, 0.0, 1.0 / c;
+  return inverse;
 }
 
 }  // namespace stretchmap::registration

@@ -19,7 +19,8 @@ bool HexNewton::step(Points& x, const HexWeights& w, const HexNewtonOptions& opt
   if (!solver_) {
     linalg::BlockMatrix hessian = energy_.pattern();
     energy_.model(x, w, gradient, hessian);
-    solver_ = std::make_unique<linalg::BlockSolver>(std::move(hessian));
+    solver_ = std::make_unique<linalg::BlockSolver>(std::move(hessian),
+                                                    linalg::BlockOptions{options.preconditioner});
   } else {
     energy_.model(x, w, gradient, solver_->matrix());
     solver_->refactor();

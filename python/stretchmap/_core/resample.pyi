@@ -52,7 +52,7 @@ class HexNewton:
         """
         Gradient and Hessian in blocks of 3x3, for checks.
         """
-    def run(self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], corner: stretchmap._core.volume.EnergyWeights, power: typing.SupportsFloat | typing.SupportsIndex, max_steps: typing.SupportsInt | typing.SupportsIndex, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.001, tol: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], HexNewtonReport]:
+    def run(self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], corner: stretchmap._core.volume.EnergyWeights, power: typing.SupportsFloat | typing.SupportsIndex, max_steps: typing.SupportsInt | typing.SupportsIndex, least_gain: typing.SupportsFloat | typing.SupportsIndex = 0.001, tol: typing.SupportsFloat | typing.SupportsIndex = 0.1, preconditioner: str = 'multigrid') -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"], HexNewtonReport]:
         ...
     def set_fit(self, samples: FitSamples, factor: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], tolerance: typing.SupportsFloat | typing.SupportsIndex = 1.0, power: typing.SupportsFloat | typing.SupportsIndex = 1.0, inward: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...

@@ -7,7 +7,6 @@ hexahedra sheared, some of them turned over; `optimize` makes them good.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,17 +17,15 @@ from ..base.arrays import read_only
 from ..base.options import callback, flag, memory, real, whole
 from ..base.progress import Progress
 from ..base.torus import Torus
-from ..errors import OptionError, SolverError
+from ..errors import OptionError
 from ..maps.given import as_map_of_solid, torus_of
-from ..mesh.meshes import TriMesh
 from .boundary_layers import thicknesses_of, with_layers
 from .hex_result import HexMesh
-from .layout import Layout, prolongation, swept_layout
-from .optimize import GridOptimizer
-from .quality import MOST_MISSED, boundary_distances, boundary_quads, missed_volume
-from .schedule import Schedule
+from .layout import Layout
+from .levels import coarse_grid, halvings_for, levels_for, refined, require_valid
+from .quality import boundary_distances, boundary_quads
 from .sizes import grid_candidates
-from .start import Start, best_starts, equal_axes, pulled_back
+from .start import pulled_back
 
 if TYPE_CHECKING:
     from ..maps.result import MapResult
@@ -37,18 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["HexMesh", "hex_mesh"]
 
 _MOST = 100_000  # hexahedra in any direction
-_BYTES_PER_HEX = 12_000  # at the peak, as measured at 200,000
-_COARSE = 16_000  # hexahedra that are optimized at once
-# Of grids as close to the surface as this share of the diagonal, or none of them, but all within
-# this factor of the closest, the shape decides.
-_CLOSE, _ALIKE = 0.005, 1.25
-# Of a grid that was split in eight: smaller quads fit better.
-_FINER = Schedule(
-    fit=3.0,
-    powers=(*(2.0,) * 2, *(3.0,) * 2, *(4.0,) * 2, *(6.0,) * 3, *(8.0,) * 3, *(12.0,) * 3),
-)
-_BETWEEN = Schedule(fit=3.0, powers=(2.0, 3.0, 4.0, 6.0, 8.0, 12.0))  # to be split once more
-_FINEST = Schedule(fit=3.0, powers=(4.0, 8.0, 12.0), steps=1)  # split twice or more
+_BYTES_PER_HEX = 12_000  # at the peak, with a hierarchy of the linear systems
 
 
 def hex_mesh(
@@ -111,8 +97,10 @@ def hex_mesh(
     boundary is held to the surface; the two whose boundaries come closest are gone on with. The one
     that ends closer is returned; of two within half a per cent of the diagonal, or both farther and
     about as far, the better shaped. A grid of more than 16,000 hexahedra with even numbers is
-    optimized with half the numbers first, then split in eight and finished. Where that fails in the
-    solid as it is, its principal axes are made equally long for the optimization.
+    optimized with half the numbers first, then split in eight and finished; beyond 128,000 that is
+    done twice, and from 384,000 on choices are compared by half the numbers of the first grid and
+    one alone is gone on with. Where that fails in the solid as it is, its principal axes are made
+    equally long for the optimization.
 
     References
     ----------
@@ -138,29 +126,19 @@ def hex_mesh(
     memory(f"a grid of {count} hexahedra", _BYTES_PER_HEX * count)
     levels = 0
     if flag("optimize", optimize):
-        while count > _COARSE * 8**levels and not np.any(np.array(candidates) % 2 ** (levels + 1)):
+        least = min(s * b * (b + 4 * r) for s, b, r in candidates)
+        while levels < levels_for(least) and not np.any(np.array(candidates) % 2 ** (levels + 1)):
             levels += 1
-        starts = best_starts(result, solid, np.array(candidates) // 2**levels, progress)
-        start = _best_optimized(starts, solid, progress)
+        start = coarse_grid(result, solid, np.array(candidates) // 2**levels, levels, progress)
     else:
         start = pulled_back(result, candidates[0])
+    n_invalid = int((_core.resample.valid_hexes(start.pulled, start.layout.H) == 0).sum())
+    start = refined(start, torus, levels, solid, progress)
     layout, grid, pulled, V = start.layout, start.grid, start.pulled, start.V
-    n_invalid = int((_core.resample.valid_hexes(pulled, layout.H) == 0).sum())
-    if optimize:
-        for level in range(levels):
-            finer = prolongation(*(k * 2**level for k in start.numbers))
-            layout = swept_layout(*(k * 2 ** (level + 1) for k in start.numbers))
-            V, pulled = (np.ascontiguousarray(finer @ points) for points in (V, pulled))
-            last = _FINER if levels == 1 else _FINEST
-            schedule = last if level == levels - 1 else _BETWEEN
-            V = _optimized(V, layout.H, solid, schedule, progress)
-        if levels:
-            grid = torus.xi(layout.u, layout.v, layout.share * torus.r)
     if len(thicknesses):
-        numbers = tuple(k * 2**levels for k in start.numbers)
-        layout, V, (grid, pulled) = with_layers(numbers, V, (grid, pulled), thicknesses)
+        layout, V, (grid, pulled) = with_layers(start.numbers, V, (grid, pulled), thicknesses)
         if optimize:
-            _require_valid(V, layout.H, "the layers are too thick for the bends of the boundary")
+            require_valid(V, layout.H, "the layers are too thick for the bends of the boundary")
     return _measured(solid, torus, layout, grid, pulled, V, n_invalid)
 
 
@@ -181,12 +159,11 @@ def _numbers(
         wanted = volume / size**3
     else:
         wanted = whole("n_hexahedra", 5000 if n_hexahedra is None else n_hexahedra, 12)
-    wanted, levels = max(wanted, 12.0), 0
-    while wanted > _COARSE * 8**levels:
-        levels += 1
+    wanted = max(wanted, 12.0)
+    factor = 2 ** halvings_for(wanted)
     chosen = [
-        (2**levels * s, 2**levels * b, 2**levels * r)
-        for s, b, r in grid_candidates(ratio, wanted / 8**levels)
+        (factor * s, factor * b, factor * r)
+        for s, b, r in grid_candidates(ratio, wanted / factor**3)
     ]
     if sections is block is rings is None:
         return chosen
@@ -198,67 +175,6 @@ def _numbers(
             whole("rings", first[2] if rings is None else rings, 1, _MOST),
         )
     ]
-
-
-def _best_optimized(starts: list[Start], solid: TetMesh, progress: Progress | None) -> Start:
-    """The start that ends best, its points optimized: close to the surface, then of good shape.
-
-    Raises
-    ------
-    SolverError
-        Hexahedra of each are left that could not be made valid; those of the first.
-    """
-    ended: list[tuple[float, float, Start]] = []
-    failure = None
-    diagonal = float(np.linalg.norm(np.ptp(solid.V, axis=0)))
-    for start in starts:
-        H = start.layout.H
-        try:
-            V = _optimized(start.V, H, solid, Schedule(), progress)
-        except SolverError as error:
-            failure = failure or error
-            continue
-        away = max(boundary_distances(V, boundary_quads(H), solid.surface)) / diagonal
-        least = float(_core.resample.scaled_jacobians(V, H).min())
-        ended.append((away, least, replace(start, V=V)))
-    if failure is not None and not ended:
-        raise failure
-    closest = min(away for away, _, _ in ended)
-    limit = _CLOSE if closest <= _CLOSE else _ALIKE * closest
-    return max((end for end in ended if end[0] <= limit), key=lambda end: end[1])[2]
-
-
-def _optimized(
-    V: NDArray[np.float64],
-    H: NDArray[np.int32],
-    solid: TetMesh,
-    schedule: Schedule,
-    progress: Progress | None,
-) -> NDArray[np.float64]:
-    surface = solid.surface
-    optimizer = GridOptimizer(V, H, surface)
-    better = optimizer.V if optimizer.run(schedule, progress) else None
-    if better is None or missed_volume(better, H, surface) > MOST_MISSED:
-        # Of a solid tens of times as long as thick, edges are next to parallel: angles do not
-        # untangle it, or swell it; what is valid with its axes equal is valid as it is.
-        axes = equal_axes(surface.V)
-        evened = TriMesh(np.ascontiguousarray(surface.V @ axes), surface.F)
-        optimizer = GridOptimizer(np.ascontiguousarray(V @ axes), H, evened)
-        optimizer.run(schedule, progress)
-        other = np.ascontiguousarray(np.linalg.solve(axes, optimizer.V.T).T)
-        if better is None or missed_volume(other, H, surface) < missed_volume(better, H, surface):
-            better = other
-    _require_valid(
-        better, H, "try other numbers of sections, block or rings, optimize=False returns the "
-        "grid as it was pulled back",
-    )  # fmt: skip
-    return better
-
-
-def _require_valid(V: NDArray[np.float64], H: NDArray[np.int32], remedy: str) -> None:
-    left = np.flatnonzero(_core.resample.valid_hexes(V, H) == 0)
-    if len(left):
-        raise SolverError(f"{len(left)} hexahedra could not be made valid; {remedy}", left)
 
 
 def _measured(

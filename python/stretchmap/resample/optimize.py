@@ -80,6 +80,7 @@ class GridOptimizer:
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
         self._sizes, self._steps = ANY_SIZES, Schedule.steps
+        self._preconditioner = Schedule.preconditioner
         self._largest_gap = np.inf
         self._matched: NDArray[np.float64] | None = None  # the points of self._samples
 
@@ -91,7 +92,7 @@ class GridOptimizer:
         SolverError
             A linear solve broke down.
         """
-        self._steps = schedule.steps
+        self._steps, self._preconditioner = schedule.steps, schedule.preconditioner
         if not self._untangle(schedule.untangle, progress):
             return False
         self._sizes = EVEN_SIZES
@@ -179,7 +180,10 @@ class GridOptimizer:
         glide round a sharp crest leave it, and the round after would send them back.
         """
         before = self._newton.value(self.V, self._corner(0.0), power).energy
-        V, _ = self._newton.run(self.V, self._corner(0.0), power, self._steps, tol=_RESIDUAL)
+        V, _ = self._newton.run(
+            self.V, self._corner(0.0), power, self._steps, tol=_RESIDUAL,
+            preconditioner=self._preconditioner,
+        )  # fmt: skip
         for _ in range(_HALVINGS + 1):
             self._match(V, strength, norm)
             if self._newton.value(V, self._corner(0.0), power).energy < before:
@@ -207,7 +211,9 @@ class GridOptimizer:
 
     def _regularized(self, min_det: float) -> None:
         epsilon = float(np.clip(-0.5 * min_det, _LEAST_EPSILON, _LARGEST_EPSILON))
-        self.V, _ = self._newton.run(self.V, self._corner(epsilon), 1.0, Schedule.steps)
+        self.V, _ = self._newton.run(
+            self.V, self._corner(epsilon), 1.0, Schedule.steps, preconditioner=self._preconditioner
+        )
 
     def _prepare(
         self, strength: float, norm: float, *, guard: bool = True, drawn: bool = True

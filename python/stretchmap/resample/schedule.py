@@ -37,6 +37,9 @@ class Schedule:
         Power p of each round after that, see `hex_energy.hpp`.
     steps : int
         Newton steps between two looks at boxes and samples.
+    preconditioner : str
+        Of their linear systems, see `BlockOptions` of the core. Where a coarser grid was optimized
+        before, what is left is local, and a hierarchy costs more than it saves.
     """
 
     untangle: int = 40
@@ -52,3 +55,4 @@ class Schedule:
         *(12.0,) * 10,
     )
     steps: int = 3
+    preconditioner: str = "multigrid"

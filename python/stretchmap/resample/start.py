@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from ..maps.result import MapResult
     from ..mesh.meshes import TetMesh
 
-__all__ = ["Start", "best_starts", "equal_axes", "pulled_back"]
+__all__ = ["TRIAL", "Start", "best_starts", "equal_axes", "pulled_back"]
 
 _BISECTIONS = 40
 _KEPT = 2  # after the first rounds: which of them ends closer is not known yet
-_TRIAL = Schedule(even=tuple(np.geomspace(0.003, 1.0, 16)), powers=(1.0,) * 2 + (2.0,) * 2)
+TRIAL = Schedule(even=tuple(np.geomspace(0.003, 1.0, 16)), powers=(1.0,) * 2 + (2.0,) * 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ def best_starts(
         H = start.layout.H
         optimizer = GridOptimizer(start.V, H, solid.surface)
         try:
-            positive = optimizer.run(_TRIAL, progress)
+            positive = optimizer.run(TRIAL, progress)
         except SolverError as error:
             failure = error
             continue

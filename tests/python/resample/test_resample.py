@@ -12,7 +12,9 @@ from shapes import a_map
 from stretchmap import samples
 from stretchmap.errors import OptionError
 from stretchmap.registration.map import register
+from stretchmap.resample import levels
 from stretchmap.resample.hexes import hex_mesh
+from stretchmap.resample.quality import missed_volume
 
 RNG = np.random.default_rng(2)
 
@@ -124,13 +126,44 @@ def test_stages_are_reported(bumpy_map):
 
 
 def test_large_grids_start_from_half_the_numbers(bumpy_map, monkeypatch):
-    from stretchmap.resample import hexes
-
-    monkeypatch.setattr(hexes, "_COARSE", 600)
+    monkeypatch.setattr(levels, "_COARSE", 600)
     mesh = hex_mesh(bumpy_map, sections=40, block=4, rings=2)
     assert len(mesh.H) == 40 * 48 and mesh.n_invalid == 0
     assert mesh.scaled_jacobians.min() > 0.3
     assert abs(mesh.volume / bumpy_map.mesh.volume - 1.0) < 0.003
+
+
+def test_of_a_large_grid_half_the_numbers_choose(bumpy_map, monkeypatch):
+    """And the choice alone is optimized; of few, and where some are odd, all are compared."""
+    monkeypatch.setattr(levels, "_COMPARED", 250)
+    compared, done = [], []
+    choose, improve = levels.best_starts, levels.optimized
+
+    def best_starts(result, solid, candidates, progress):
+        compared.append(np.array(candidates).tolist())
+        return choose(result, solid, candidates, progress)
+
+    def optimized(V, H, *rest):
+        done.append(len(H))
+        return improve(V, H, *rest)
+
+    monkeypatch.setattr(levels, "best_starts", best_starts)
+    monkeypatch.setattr(levels, "optimized", optimized)
+    solid = bumpy_map.mesh
+    even = np.array([[16, 2, 2], [24, 4, 2]])
+    start = levels.coarse_grid(bumpy_map, solid, even, 2, None)
+    assert compared.pop() == [[8, 1, 1], [12, 2, 1]] and list(start.numbers) in even.tolist()
+    sections, block, rings = start.numbers
+    assert done == [len(start.layout.H)] == [sections * block * (block + 4 * rings)]
+    assert missed_volume(start.V, start.layout.H, solid.surface) < 0.005
+    for candidates, times in ((even, 1), (even + 1, 2)):
+        levels.coarse_grid(bumpy_map, solid, candidates, times, None)
+        assert compared.pop() == candidates.tolist()
+
+
+def test_sizes_that_are_halved_once_more_to_compare_choices():
+    assert [levels.levels_for(k) for k in (16_000, 16_001, 128_001, 1e6)] == [0, 1, 2, 2]
+    assert [levels.halvings_for(k) for k in (16_000, 100_000, 380_000, 1e6)] == [0, 1, 2, 3]
 
 
 def test_the_size_wanted_is_met(bumpy_map):

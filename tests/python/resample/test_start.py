@@ -11,7 +11,7 @@ import stretchmap as sm
 from shapes import a_map
 from stretchmap import _core
 from stretchmap.errors import SolverError
-from stretchmap.resample import hexes
+from stretchmap.resample import levels
 from stretchmap.resample import start as module
 from stretchmap.resample.optimize import GridOptimizer
 from stretchmap.resample.quality import boundary_distances, boundary_quads, missed_volume
@@ -60,7 +60,7 @@ def test_of_the_two_closest_the_one_that_ends_closer_is_returned(monkeypatch):
     result, solid = a_ring()
     starts = best_starts(result, solid, [(6, 1, 1), (16, 3, 1), (8, 2, 1)])
     assert len(starts) == 2
-    alone = [hexes._best_optimized([start], solid, None) for start in starts]
+    alone = [levels._best_optimized([start], solid, None) for start in starts]
 
     def quality(start):
         H = start.layout.H
@@ -70,22 +70,22 @@ def test_of_the_two_closest_the_one_that_ends_closer_is_returned(monkeypatch):
     closer, farther = sorted(alone, key=lambda start: quality(start)[0])
     better = max(alone, key=lambda start: quality(start)[1])
     for close, alike, expected in ((0.0, 1.0, closer), (0.0, 1e9, better), (1.0, 1.0, better)):
-        monkeypatch.setattr(hexes, "_CLOSE", close)
-        monkeypatch.setattr(hexes, "_ALIKE", alike)
+        monkeypatch.setattr(levels, "_CLOSE", close)
+        monkeypatch.setattr(levels, "_ALIKE", alike)
         for order in (starts, starts[::-1]):
-            assert hexes._best_optimized(order, solid, None).numbers == expected.numbers
+            assert levels._best_optimized(order, solid, None).numbers == expected.numbers
 
-    real = hexes._optimized
+    real = levels.optimized
 
     def fails(V, H, *rest):
         if len(H) == len(closer.layout.H):
             raise SolverError("not valid", [3])
         return real(V, H, *rest)
 
-    monkeypatch.setattr(hexes, "_optimized", fails)
-    assert hexes._best_optimized(starts, solid, None).numbers == farther.numbers
+    monkeypatch.setattr(levels, "optimized", fails)
+    assert levels._best_optimized(starts, solid, None).numbers == farther.numbers
     with pytest.raises(SolverError, match="not valid"):
-        hexes._best_optimized([closer], solid, None)
+        levels._best_optimized([closer], solid, None)
 
 
 def stretched(solid, length):
@@ -101,7 +101,7 @@ def test_hexahedra_are_even_before_they_fit():
     result = sm.volume_map(solid, balance=0.0)
     start = pulled_back(result, (30, 3, 1))
     largest = []
-    for schedule in (module._TRIAL, replace(module._TRIAL, even=())):
+    for schedule in (module.TRIAL, replace(module.TRIAL, even=())):
         optimizer = GridOptimizer(start.V, start.layout.H, solid.surface)
         assert optimizer.run(schedule)
         volumes = _core.resample.hex_volumes(optimizer.V, start.layout.H)
@@ -118,7 +118,7 @@ def test_what_lost_the_surface_is_not_gone_on_with():
     start = best_starts(result, long, [(24, 2, 1)])[0]
     assert np.array_equal(start.V, start.pulled)
     optimizer = GridOptimizer(start.V, start.layout.H, long.surface)
-    optimizer.run(module._TRIAL)
+    optimizer.run(module.TRIAL)
     assert missed_volume(optimizer.V, start.layout.H, long.surface) > 0.05
 
 

@@ -54,4 +54,7 @@ Vec equal_area_from_angle(const VecRef& v, double tube_ratio);
 // \return its inverse, Kepler's equation, to rounding; s - v stays within one turn of the argument.
 Vec angle_from_equal_area(const VecRef& s, double tube_ratio);
 
+// The same of one number in [-pi, pi], by Newton's method from a guess.
+double equal_area_angle(double s, double tube_ratio, double guess);
+
 }  // namespace stretchmap::area

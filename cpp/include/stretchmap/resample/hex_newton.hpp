@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "stretchmap/resample/hex_energy.hpp"
@@ -13,6 +14,7 @@ struct HexNewtonOptions {
   double least_gain = 1e-3;  // stop when a step lowers the energy by a smaller share
   double tol = 0.1;          // relative residual asked of the conjugate gradients
   int max_cg = 100;
+  std::string preconditioner = "multigrid";  // see BlockOptions; that of the first run stays
 };
 
 struct HexNewtonReport {

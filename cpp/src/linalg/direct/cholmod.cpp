@@ -1,5 +1,6 @@
 #include "linalg/direct/cholmod.hpp"
 
+#include "linalg/direct/refined_solve.hpp"
 #include "stretchmap/base/errors.hpp"
 
 #ifdef STRETCHMAP_CHOLMOD
@@ -100,5 +101,19 @@ void Cholmod::refactor(const SparseMatrix&) {}
 void Cholmod::substitute(const double*, double*, int) {}
 
 #endif
+
+template <int K>
+PcgResult<K> Cholmod::solve(const SparseMatrix& A, const double* B, double* X,
+                            const SolveOptions& options) {
+  return refined_solve<K>(A, B, X, options,
+                          [this](const double* b, double* x) { substitute(b, x, K); });
+}
+
+template PcgResult<1> Cholmod::solve(const SparseMatrix&, const double*, double*,
+                                     const SolveOptions&);
+template PcgResult<2> Cholmod::solve(const SparseMatrix&, const double*, double*,
+                                     const SolveOptions&);
+template PcgResult<4> Cholmod::solve(const SparseMatrix&, const double*, double*,
+                                     const SolveOptions&);
 
 }  // namespace stretchmap::linalg

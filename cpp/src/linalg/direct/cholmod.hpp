@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "stretchmap/base/types.hpp"
+#include "linalg/krylov/pcg.hpp"
 
 namespace stretchmap::linalg {
 
@@ -17,10 +17,14 @@ class Cholmod {
   // Keeps the symbolic analysis. \throws SolverError as the constructor.
   void refactor(const SparseMatrix& A);
 
-  // X = A^-1 B, B and X (n, k) row-major.
-  void substitute(const double* B, double* X, int k);
+  // X = A^-1 B, B and X (n, K) row-major, refined: see refined_solve.hpp.
+  template <int K>
+  PcgResult<K> solve(const SparseMatrix& A, const double* B, double* X,
+                     const SolveOptions& options);
 
  private:
+  void substitute(const double* B, double* X, int k);
+
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -1,5 +1,6 @@
 #include "linalg/krylov/pcg.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -92,6 +93,16 @@ struct Run {
     return true;
   }
 
+  // Of a start at zero it needs no product.
+  void first_residual() {
+    if (std::any_of(x, x + static_cast<std::size_t>(K) * system.n,
+                    [](double v) { return v != 0.0; }))
+      return true_residual();
+    std::fill(q.begin(), q.end(), 0.0);
+    rr = residual_from<K>(system.n, b, q.data(), r.data(), r_f.data());
+    result.finite = result.finite && all_finite<K>(rr);
+  }
+
   void true_residual() {
     system.apply(x, q.data());
     rr = residual_from<K>(system.n, b, q.data(), r.data(), r_f.data());
@@ -165,7 +176,7 @@ PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVect
   if (!(run.result.finite = all_finite<K>(bb))) return run.result;
   run.begin(bb, options.tol);
   // The recursive residual drifts from the true one; a restart from the true one closes the gap.
-  run.true_residual();
+  run.first_residual();
   const Scalars<K> first = run.rr;
   for (int restart = 0; restart < 4 && run.result.finite && !run.reached(); ++restart) {
     const int before = run.result.iterations;

@@ -82,7 +82,7 @@ bool invert(const ColBlock<double, B>& block, ColBlock<double, B>& inverse) {
   if constexpr (B > 3) {
     return invert_positive(block, inverse);
   } else {
-    if (Eigen::LLT<ColBlock<double, B>>(block).info() != Eigen::Success) return false;
+    if (!is_positive_definite(block)) return false;
     inverse = block.inverse();
     return true;
   }

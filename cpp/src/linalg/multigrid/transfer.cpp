@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "linalg/multigrid/block_products.hpp"
+
 namespace stretchmap::linalg {
 namespace {
 
@@ -138,7 +140,7 @@ template <int B, int K>
 void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
   constexpr size_t kSize = static_cast<size_t>(B) * K;
   const std::vector<Index>& of = aggregates.of;
-  p_value.resize(kSize * p.col.size());
+  p_value.resize(kSize * p.col.size() + 1);  // see add_block_products
   const auto rows = [&](Index begin, Index end, std::vector<Index>& slot) {
     std::vector<double> sum;
     for (Index i = begin; i < end; ++i) {
@@ -188,13 +190,19 @@ template <int B, int K>
 std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) {
   constexpr size_t kSize = static_cast<size_t>(B) * K, kCoarse = static_cast<size_t>(K) * K;
   const auto make_slots = [&] { return std::vector<Index>(aggregates.count); };
-  product_.resize(kSize * ap.col.size());
+  product_.resize(kSize * ap.col.size() + 1);  // see add_block_products
   for_chunks_with(A.n, make_slots, [&](Index begin, Index end, std::vector<Index>& slot) {
     for (Index i = begin; i < end; ++i) {
       for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e) slot[ap.col[e]] = e;
       std::fill(product_.begin() + kSize * ap.start[i], product_.begin() + kSize * ap.start[i + 1],
                 0.0);
       const auto add = [&](const double* a, Index j) {
+        if constexpr (B == 3 && K == 3) {
+          const size_t first = p.start[j];
+          add_block_products(a, p_value.data() + kSize * first, p.col.data() + first,
+                             p.start[j + 1] - p.start[j], slot.data(), product_.data());
+          return;
+        }
         for (Index e = p.start[j]; e < p.start[j + 1]; ++e) {
           multiply_add<B, B, K, false>(a, p_value.data() + kSize * e,
                                        product_.data() + kSize * slot[p.col[e]]);
@@ -214,6 +222,14 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) {
           for (Index e = r.start[a]; e < r.start[a + 1]; ++e) {
             const Index i = r.col[e];
             const float* left = r_value.data() + kSize * e;
+            if constexpr (B == 3 && K == 3) {
+              const size_t first = ap.start[i];
+              double transposed[9];
+              for (int k = 0; k < 9; ++k) transposed[k] = left[3 * (k % 3) + k / 3];
+              add_block_products(transposed, product_.data() + kSize * first, ap.col.data() + first,
+                                 ap.start[i + 1] - ap.start[i], slot.data(), values.data());
+              continue;
+            }
             for (Index f = ap.start[i]; f < ap.start[i + 1]; ++f) {
               multiply_add<K, B, K, true>(left, product_.data() + kSize * f,
                                           values.data() + kCoarse * slot[ap.col[f]]);
