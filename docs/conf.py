@@ -33,6 +33,8 @@ html_sidebars = {page: [] for page in alone if page != "api"}
 templates_path = ["templates"]
 html_static_path = ["static"]
 html_css_files = ["narrow.css"]
+html_favicon = "static/favicon.svg"
+html_context = {"default_mode": "auto"}  # the theme complains in the browser when it is not set
 exclude_patterns = [
     "results.md",
     "release.md",

@@ -145,7 +145,7 @@ def distances(population: Population) -> Figure:
     >>> bones = sm.samples.vertebra_population(6, seed=2, n_tets=600)
     >>> found = sm.population.fit(bones.solids[:3], max_rounds=1, tol=1.0)
     >>> distances(found).axes[0].get_ylabel()
-    'distance from the mean (unit of the shapes)'
+    'distance from the mean\\n(unit of the shapes)'
     """
     population = instance("population", population, Population, "stretchmap.population.fit(...)")
     figure = empty_figure(9.6, 3.2)
@@ -157,7 +157,7 @@ def distances(population: Population) -> Figure:
     axes.bar(np.arange(len(names)), population.distances[order], color=colors)
     step = max(1, len(names) // 40)
     axes.set_xticks(np.arange(0, len(names), step), names[::step], rotation=90, fontsize=8)
-    axes.set_ylabel("distance from the mean (unit of the shapes)")
+    axes.set_ylabel("distance from the mean\n(unit of the shapes)")
     if far:
         axes.bar([0], [0], color=VERMILION, label="unlike the others")
         figure.legend(loc=BELOW)

@@ -9,7 +9,7 @@ import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -160,7 +160,14 @@ def _start(shapes: list[Shape], template: Any, landmarks: Any) -> tuple[TetMesh,
         if isinstance(template, str) and shape.name == template:
             return shape.load(), shape.load_landmarks()
     if isinstance(template, (str, os.PathLike)):
-        own = Shape(_TEMPLATE, as_path(template))
+        path = as_path(template)
+        if not path.exists():
+            raise OptionError(
+                f"template {str(template)!r} is neither the name of a shape "
+                f"({', '.join(s.name for s in shapes[:5])}{', ...' if len(shapes) > 5 else ''}) "
+                "nor a file"
+            )
+        own = Shape(_TEMPLATE, path)
     else:
         own = Shape(_TEMPLATE, as_solid(template, "template"))
     if landmarks is not None:
@@ -207,6 +214,7 @@ class _Run:
     scale: bool
     volume_weight: float
     progress: Progress | None
+    faults: dict[int, str] = field(default_factory=dict)  # of shapes, in the last round
 
     def until_at_rest(
         self, solid: TetMesh, anchors: Anchors | None, max_rounds: int, tol: float
@@ -258,8 +266,10 @@ class _Run:
         for i, outcome in self.executor.run(run_job, jobs):
             lost = isinstance(outcome, Exception)
             records[i] = failed(jobs[i], str(outcome)) if lost else outcome
-            if not records[i]["ok"]:
-                _log.warning("%s is skipped: %s", jobs[i].shape.name, records[i]["error"])
+            fault = "" if records[i]["ok"] else records[i]["error"]
+            if fault and self.faults.get(i) != fault:  # the same in every round
+                _log.warning("%s is skipped: %s", jobs[i].shape.name, fault)
+            self.faults[i] = fault
             report(self.progress, f"round {number + 1}", len(records), len(jobs))
         done = [i for i in range(len(jobs)) if records[i]["ok"]]
         if len(done) < 2:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +24,8 @@ from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 
 __all__ = ["Shape", "gather_landmarks", "gather_shapes"]
+
+_log = logging.getLogger("stretchmap")
 
 Array = NDArray[np.float64]
 
@@ -105,8 +108,12 @@ def gather_shapes(solids: Any) -> list[Shape]:
             raise FileNotFoundError(2, "no such folder", str(folder))
         known = suffixes(solid=True)
         found = sorted(p for p in folder.iterdir() if p.suffix.lower() in known and p.is_file())
+        surfaces = _surfaces(folder, known)
         if not found:
-            raise OptionError(f"{folder} holds no mesh of tets ({', '.join(known)})")
+            advice = f"; {surfaces} as surfaces: fill them first (`prepare`)" if surfaces else ""
+            raise OptionError(f"{folder} holds no mesh of tets ({', '.join(known)}){advice}")
+        if surfaces:
+            _log.warning("%s left out: surfaces have to be filled first (`prepare`)", surfaces)
         return gather_shapes([path for path in found if not path.name.startswith(".")])
     if isinstance(solids, Mapping):
         return _checked([_shape(entry, str(name)) for name, entry in solids.items()])
@@ -117,6 +124,13 @@ def gather_shapes(solids: Any) -> list[Shape]:
         )
     width = len(str(max(len(solids) - 1, 0)))
     return _checked([_shape(entry, f"{i:0{width}d}") for i, entry in enumerate(solids)])
+
+
+def _surfaces(folder: Path, known: Sequence[str]) -> str:
+    """Names of the files in a folder that can hold a surface only."""
+    only = set(suffixes(solid=False)) - set(known)
+    names = sorted(p.name for p in folder.iterdir() if p.suffix.lower() in only and p.is_file())
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
 def gather_landmarks(shapes: list[Shape], landmarks: Any) -> list[Shape]:

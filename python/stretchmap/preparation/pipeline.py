@@ -240,8 +240,8 @@ class _Run:
         self.done("fill", {**counts, "percent_of_volume_lost": round(100.0 * lost, 2)})
         if lost > _MUCH:
             _log.warning(
-                "prepare: %.0f %% of the volume is lost where the solid is thinner than its "
-                "triangles are long; ask for more faces",
+                "prepare: %.0f %% of the volume is lost, as a rule where the solid is thinner than "
+                "its triangles are long; look at what is missing, and ask for more faces",
                 100.0 * lost,
             )
         return solid

@@ -20,7 +20,7 @@ from population.truth import correspondence_errors, material, mode_angles, size
 from stretchmap.errors import OptionError, SolverError
 from stretchmap.population.executors import WorkerLost, as_executor
 from stretchmap.population.shapes import gather_shapes
-from stretchmap.samples.solids import _cells
+from stretchmap.samples.solids import cut_cells
 
 ROUNDS = {"max_rounds": 2, "tol": 0.01}
 
@@ -171,7 +171,7 @@ def test_landmarks_and_a_template_of_its_own(bones, tmp_path):
 def test_tets_that_the_boundary_alone_decides_about_are_split():
     cells = np.ones((3, 3, 1), bool)
     cells[1, 1] = False
-    V, T = _cells(cells.repeat(2, 0).repeat(2, 1))
+    V, T = cut_cells(cells.repeat(2, 0).repeat(2, 1))
     solids = [sm.TetMesh(V * [1.0 + 0.1 * i, 1.0, 0.7 + 0.2 * i], T) for i in range(3)]
     assert len(solids[0].boundary_vertices) == solids[0].n_vertices
     found = sm.population.fit(solids, max_rounds=1, tol=1.0)
@@ -220,9 +220,29 @@ def test_shapes_are_found_and_named(tmp_path, bones):
             gather_shapes(bad)
 
 
+def test_surfaces_in_the_folder_are_named_not_passed_over(tmp_path, bones, caplog):
+    for i in range(7):
+        sm.write(tmp_path / f"scan{i}.ply", bones.solids[0].surface)
+    (tmp_path / "notes.txt").write_text("no mesh")
+    with pytest.raises(OptionError, match=r"scan0.ply, .* and 2 more as surfaces: fill them first"):
+        gather_shapes(tmp_path)
+    sm.write(tmp_path / "bone.npz", bones.solids[0])
+    assert [s.name for s in gather_shapes(tmp_path)] == ["bone"]
+    (told,) = [r.getMessage() for r in caplog.records]
+    assert "scan4.ply and 2 more left out" in told and "notes" not in told
+
+
+def test_what_is_skipped_is_told_once(folder, caplog):
+    found = sm.population.fit(folder, max_rounds=2, tol=0.0)
+    assert len(found.moved) == 2 and set(found.skipped) == {"bad"}
+    assert sum("bad is skipped" in r.getMessage() for r in caplog.records) == 1
+
+
 def test_runs_that_cannot_be(serial, folder, bones):
     with pytest.raises(OptionError, match="other settings"):
         sm.population.fit(folder, folder=serial.folder, along="area")
+    with pytest.raises(OptionError, match=r"neither the name of a shape \(0, 1, .*\.\.\.\) nor"):
+        sm.population.fit(bones.solids, "bone0")
     with pytest.raises(SolverError, match="two are needed"):
         sm.population.fit(bones.solids[:1])
     with pytest.raises(SolverError, match="no shape can be read"):
