@@ -83,7 +83,7 @@ FaceReport BoundaryBarrier::value(const PointsRef& x, const GlideSites& sites, I
 
 void BoundaryBarrier::model(const PointsRef& x, const GlideSites& sites, Index f, double epsilon,
                             Eigen::Matrix<double, 6, 1>& gradient,
-                            Eigen::Matrix<double, 6, 6>& hessian) const {
+                            Eigen::Matrix<double, 6, 6>* hessian) const {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   const State s = state(x, sites, f);
@@ -95,8 +95,8 @@ void BoundaryBarrier::model(const PointsRef& x, const GlideSites& sites, Index f
   }
   const Eigen::Map<const Vector6> J(s.J.data());
   const Vector6 slope = jacobian.transpose() * J;  // half the gradient of |J|^2
-  const Matrix6 square = jacobian.transpose() * jacobian;
   const double I = s.J.squaredNorm(), weight = boundary_.weights[f] / s.samples;
+  double stiffness = 0.0;  // of |J|^2 / 2
 
   for (int k = 0; k < s.samples; ++k) {
     Vector6 d;  // gradient of sigma_k
@@ -110,12 +110,14 @@ void BoundaryBarrier::model(const PointsRef& x, const GlideSites& sites, Index f
     const Regularized chi = regularized(sigma, epsilon);
     const double q = 1.0 / chi.value, t = chi.first * q;
     gradient += weight * q * (slope + (sigma - 0.5 * N * t) * d);
-    // (J, sigma, chi) -> (|J|^2 + sigma^2 + 1) / (2 chi) is convex.
-    const Vector6 along = sigma * d;
-    hessian += weight * q *
-               (square + d * d.transpose() - t * (slope + along) * d.transpose() -
-                t * d * (slope + along).transpose() + t * t * N * d * d.transpose());
+    if (!hessian) continue;
+    // (J, sigma, chi) -> (|J|^2 + sigma^2 + 1) / (2 chi) is convex; what is added besides |J|^2 is
+    // d c' + c d'.
+    stiffness += weight * q;
+    const Vector6 c = weight * q * ((0.5 + t * (0.5 * t * N - sigma)) * d - t * slope);
+    for (int j = 0; j < 6; ++j) hessian->col(j) += c[j] * d + d[j] * c;
   }
+  if (hessian) hessian->noalias() += stiffness * (jacobian.transpose() * jacobian);
 }
 
 Vec least_facing(const GlidingBoundary& boundary, const PointsRef& x) {

@@ -26,19 +26,37 @@ GlideSites sites_at(const GlideSurface& surface, const PointsRef& x,
   return sites;
 }
 
+namespace {
+
+// Cosine and sine of the angle of (x, y).
+struct Turn {
+  double c, s;
+
+  Turn(double x, double y) {
+    const double length = std::sqrt(x * x + y * y);
+    c = x / length;
+    s = y / length;
+  }
+  // A little further.
+  void add(double angle) {
+    const double ca = std::cos(angle), sa = std::sin(angle), c0 = c;
+    c = c0 * ca - s * sa;
+    s = s * ca + c0 * sa;
+  }
+};
+
+}  // namespace
+
 TorusSurface::TorusSurface(double R, double r) : torus_{R, r} {}
 
 Index TorusSurface::place(const Vector3d&) const { return -1; }
 
 Matrix3d TorusSurface::frame(const Vector3d& x, Index) const {
-  const double rho = x.head<2>().norm();
-  const double cu = x[0] / rho, su = x[1] / rho;
-  const double v = std::atan2(x[2], rho - torus_.R);
-  const double cv = std::cos(v), sv = std::sin(v);
+  const Turn u(x[0], x[1]), v(x.head<2>().norm() - torus_.R, x[2]);
   Matrix3d Q;
-  Q.col(0) << -su, cu, 0.0;
-  Q.col(1) << -sv * cu, -sv * su, cv;
-  Q.col(2) << cv * cu, cv * su, sv;
+  Q.col(0) << -u.s, u.c, 0.0;
+  Q.col(1) << -v.s * u.c, -v.s * u.s, v.c;
+  Q.col(2) << v.c * u.c, v.c * u.s, v.s;
   return Q;
 }
 
@@ -59,9 +77,11 @@ Matrix3d TorusSurface::outward_derivative(const Vector3d& x, Index) const {
 
 Vector3d TorusSurface::moved(const Vector3d& x, Index, const Vector2d& step) const {
   const double rho = x.head<2>().norm();
-  const double u = std::atan2(x[1], x[0]) + step[0] / rho;
-  const double v = std::atan2(x[2], rho - torus_.R) + step[1] / torus_.r;
-  return torus_.point(u, v);
+  Turn u(x[0], x[1]), v(rho - torus_.R, x[2]);
+  u.add(step[0] / rho);
+  v.add(step[1] / torus_.r);
+  const double w = torus_.R + torus_.r * v.c;
+  return {w * u.c, w * u.s, torus_.r * v.s};
 }
 
 // Of xi along arc length: uu is -radial / rho, vv is -normal / r, uv is -sin(v) e_u / rho, radial

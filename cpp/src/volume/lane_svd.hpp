@@ -25,11 +25,11 @@ struct LaneSweep {
     for (int l = 0; l < kLanes; ++l) worst[l] = open[l] = 1.0;
   }
   // Whether any lane has to go on. Convergence is quadratic: what is left after a sweep that found
-  // 1e-20 (a square) is below rounding.
+  // 1e-12 (a square) is no more than that, and what comes out is a model Hessian.
   STRETCHMAP_INLINE bool next() {
     double any = 0.0;
     for (int l = 0; l < kLanes; ++l) {
-      open[l] = worst[l] < 1e-20 ? 0.0 : open[l];
+      open[l] = worst[l] < 1e-12 ? 0.0 : open[l];
       any += open[l];
       worst[l] = 0.0;
     }

@@ -173,7 +173,7 @@ void SolidEnergy::add_face(const PointsRef& x, const GlideSites& sites, const En
                            double* blocks) const {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-  barrier_.model(x, sites, f, w.epsilon, g, H);
+  barrier_.model(x, sites, f, w.epsilon, g, blocks ? &H : nullptr);
   for (int a = 0; a < 3; ++a) {
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;

@@ -74,9 +74,6 @@ SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
     weights_[t] = elements.weights[order_[t]];
   }
   number_sites();
-  build_pattern();
-  find_face_slots();
-  part_rows();
 }
 
 void SolidEnergy::number_sites() {
@@ -164,7 +161,12 @@ Index SolidEnergy::find_block(Index row, Index column) const {
   return static_cast<Index>(std::lower_bound(first, last, column) - col_.data());
 }
 
-linalg::BlockMatrix SolidEnergy::pattern() const {
+linalg::BlockMatrix SolidEnergy::pattern() {
+  if (row_ptr_.size() == 0) {
+    build_pattern();
+    find_face_slots();
+    part_rows();
+  }
   linalg::BlockMatrix matrix;
   matrix.row_ptr = row_ptr_;
   matrix.col = col_;

@@ -58,8 +58,8 @@ Flags motion_of(const tests::Solid& solid, int fixed_every) {
 TEST_CASE("faces whose vertices are fixed change no derivative") {
   const tests::Solid solid = tests::solid_torus(600);
   const Flags motion = motion_of(solid, 1);
-  const SolidEnergy with = energy_of(solid, motion, boundary_of(solid));
-  const SolidEnergy without = energy_of(solid, motion);
+  SolidEnergy with = energy_of(solid, motion, boundary_of(solid));
+  SolidEnergy without = energy_of(solid, motion);
   const Points x = shaken(solid, 1e-2);
   Points gradient, same;
   linalg::BlockMatrix hessian = with.pattern(), model = without.pattern();
@@ -75,7 +75,7 @@ TEST_CASE("the gradient of a solid's energy matches differences") {
   const Points x = shaken(solid, 1e-2);
   const EnergyWeights weights{1.0, 2.0, 0.2, 0.5};
   for (const int fixed_every : {0, 1, 3}) {
-    const SolidEnergy energy = energy_of(solid, motion_of(solid, fixed_every), boundary_of(solid));
+    SolidEnergy energy = energy_of(solid, motion_of(solid, fixed_every), boundary_of(solid));
     Points gradient;
     linalg::BlockMatrix hessian = energy.pattern();
     energy.model(x, weights, gradient, &hessian);

@@ -52,9 +52,9 @@ class BoundaryBarrier {
 
   // \param sites with frames.
   // \param gradient,hessian what the derivatives by steps of the three vertices along the first two
-  //        axes of their frames are added to.
+  //        axes of their frames are added to; no second ones if `hessian` is null.
   void model(const PointsRef& x, const GlideSites& sites, Index f, double epsilon,
-             Eigen::Matrix<double, 6, 1>& gradient, Eigen::Matrix<double, 6, 6>& hessian) const;
+             Eigen::Matrix<double, 6, 1>& gradient, Eigen::Matrix<double, 6, 6>* hessian) const;
 
  private:
   struct State;

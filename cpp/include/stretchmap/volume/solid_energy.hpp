@@ -52,7 +52,8 @@ class SolidEnergy {
 
   Index tets() const { return static_cast<Index>(tets_.rows()); }
   Index rows() const { return static_cast<Index>(row_vertex_.size()); }
-  linalg::BlockMatrix pattern() const;  // of the Hessian, values zero
+  // Of the Hessian, values zero. Found when it is first asked for: an energy may only be looked at.
+  linalg::BlockMatrix pattern();
 
   // From now on J is multiplied by target^(-1/3): det J = 1 where a tet has `target` times the
   // volume the rest matrix asks for.
@@ -65,7 +66,7 @@ class SolidEnergy {
 
   // \param gradient (rows, 3) in vertex frames.
   // \param hessian likewise, positive semi-definite if w.negative is 0; not computed if null.
-  // \pre value(x, w).energy is finite.
+  // \pre value(x, w).energy is finite, and pattern() has been asked for.
   void model(const PointsRef& x, const EnergyWeights& w, Points& gradient,
              linalg::BlockMatrix* hessian) const;
 
