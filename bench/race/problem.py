@@ -72,7 +72,8 @@ def make_problem(sample: sm.TetMesh) -> tuple[Problem, str]:
     problem = Problem(solid, found[0])
     if np.isfinite(problem.energy.value(problem.start)):
         return problem, "harmonic start"
-    image = sm.volume_map(solid, boundary="frozen", balance=0.0).image
+    shape = sm.VolumeOptions(volume_weight=0.01, target_iter=0, shift_iter=0)
+    image = sm.volume_map(solid, boundary="frozen", options=shape).image
     volume = sm.TetMesh(image, solid.T).volume
     return Problem(solid, image / volume ** (1.0 / 3.0)), "start that keeps shapes"
 

@@ -14,7 +14,7 @@ from stretchmap import TetMesh, TriMesh, samples
 
 Array = NDArray[np.float64]
 
-_TETS_PER_FACE = 2.2  # as tetgen fills a closed surface of even triangles
+TETS_PER_FACE = 2.2  # as tetgen fills a closed surface of even triangles
 
 
 class Rejected(Exception):
@@ -107,7 +107,7 @@ def genus_one(V: Array, F: NDArray[np.integer]) -> TriMesh:
 
 def even_edge(area: float, n_tets: float) -> float:
     """Edge length of even triangles between which tetgen puts about ``n_tets`` tets."""
-    return math.sqrt(area / (0.433 * n_tets / _TETS_PER_FACE))
+    return math.sqrt(area / (0.433 * n_tets / TETS_PER_FACE))
 
 
 def remesh(surface: TriMesh, edge: float, sampling: float = 8.0) -> TriMesh:

@@ -44,6 +44,16 @@ DOUBLE = box(5, 3, 1, holes=((1, 1, 0), (3, 1, 0)))
 SHELL = box(3, 3, 3, holes=((1, 1, 1),))
 
 
+def mug(width: int, wall: int, height: int) -> TetMesh:
+    """A square one with a handle; no vertex is inside a wall of one cell."""
+    filled = box(width + 4, width, height)
+    filled[width:] = False
+    filled[wall : width - wall, wall : width - wall, wall:] = False
+    filled[width : width + 3, width // 2, [1, height - 2]] = True
+    filled[width + 2, width // 2, 1 : height - 1] = True
+    return TetMesh(*cubes(filled))
+
+
 def thick_ring_with_bubble() -> NDArray[np.bool_]:
     """A solid torus with a cavity."""
     filled = box(7, 7, 3, holes=((1, 1, 1),))

@@ -192,7 +192,7 @@ def ball(n: int = 6) -> TetMesh:
     """
     n = whole("n", n, 1)
     memory(f"a mesh of {48 * n**3} tets", _BYTES_PER_CELL * 8 * n**3)
-    V, T = _cells(np.ones((2 * n,) * 3, bool))
+    V, T = cut_cells(np.ones((2 * n,) * 3, bool))
     V = V / n - 1.0
     # Each cube shell goes to the sphere of the same size.
     size = np.abs(V).max(axis=1, keepdims=True)
@@ -227,7 +227,7 @@ def solid_double_torus(n: int = 2) -> TetMesh:
     n = whole("n", n, 1)
     memory(f"a mesh of {78 * n**3} tets", _BYTES_PER_CELL * 13 * n**3)
     cells = plate.repeat(n, 0).repeat(n, 1).repeat(n, 2)
-    V, T = _cells(cells)
+    V, T = cut_cells(cells)
     return TetMesh(V / n, T)
 
 
@@ -241,7 +241,7 @@ def _revolved(torus: Torus, scale: Callable[[Array, Array], Array]) -> Embedding
     return embed
 
 
-def _cells(cells: NDArray[np.bool_]) -> tuple[Array, NDArray[np.intp]]:
+def cut_cells(cells: NDArray[np.bool_]) -> tuple[Array, NDArray[np.intp]]:
     """Unit cubes cut into six tets each along parallel diagonals; used vertices only."""
     shape = np.array(cells.shape) + 1
     strides = np.array([shape[1] * shape[2], shape[2], 1])

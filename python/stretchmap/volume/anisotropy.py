@@ -13,6 +13,7 @@ __all__ = ["unstretching"]
 
 _SAMPLE = 20_000  # tets
 _STEPS, _TOL = 100, 1e-4
+_FROM, _TO = np.triu_indices(4, 1)
 _MUCH = 3.0  # ratio of axes up to which a mesh is as good as even
 
 
@@ -35,7 +36,8 @@ def unstretching(V: NDArray[np.float64], T: NDArray[np.int32]) -> NDArray[np.flo
     which long edges do not sway.
     """
     T = T[:: -(-len(T) // _SAMPLE)]
-    edges = (V[T[:, 1:]] - V[T[:, :1]]).reshape(-1, 3)
+    # All six: of grids cut along diagonals, those at a tet's first corner have the diagonal's.
+    edges = (V[T[:, _TO]] - V[T[:, _FROM]]).reshape(-1, 3)
     edges = edges / np.linalg.norm(edges, axis=1, keepdims=True).mean()
     scatter = np.eye(3)
     for _ in range(_STEPS):

@@ -29,6 +29,7 @@ _STEPS, _TOL = 100, 0.05
 _SEM_STEPS = 10
 _GENTLE = SHAPES[2:]  # lighter ones leave folds, which opened become needles
 _LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a limb
+_LESS_FAT = (1.6, 2.5)  # times that ratio, where coarse triangles fold
 _LOST = 1e-16  # of its area a face has no more
 
 
@@ -65,14 +66,7 @@ def boundary_starts(
     if unstretch is not None:
         surface = TriMesh(surface.V @ unstretch, surface.F)
     maps = _BoundaryMaps(surface, options, progress)
-    makers: list[Callable[[], AreaMap | None]]
-    if glide:
-        on_fatter = [maps.fatter, lambda: maps.gentle(maps.fatter_ratio)]
-        makers = [maps.unfolded, *(on_fatter if options.ratio is None else [])]
-        makers += [lambda: maps.gentle(maps.ratio), maps.folded, lambda: maps.after(_STEPS)]
-    else:
-        makers = [lambda: maps.after(_STEPS), lambda: maps.after(0), maps.gentle_finished]
-    for found in _all_there_are(makers):
+    for found in _all_there_are(maps.gliding() if glide else maps.held()):
         if unstretch is not None:
             reason = f"{found.stop_reason}, a stretch of the surface undone"
             found = dataclasses.replace(
@@ -104,6 +98,25 @@ class _BoundaryMaps:
         self.conformal = conformal_map(surface, progress=progress)
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
+        self.is_unfolded = False
+
+    def gliding(self) -> Iterator[Callable[[], AreaMap | None]]:
+        """What makes them one after the other, for a boundary that will move."""
+        yield self.unfolded
+        if self.ratio == "search":
+            # Kept shapes are cheaper to make, and to compare with what was unfolded; where nothing
+            # was, equal areas lead further if they serve.
+            makers = self.gentle_on_fatter, self.fatter
+            yield from makers if self.is_unfolded else makers[::-1]
+        yield lambda: self.gentle(self.ratio)
+        yield self.folded
+        yield lambda: self.after(_STEPS)
+
+    def held(self) -> Iterator[Callable[[], AreaMap | None]]:
+        """The same for one that will not."""
+        yield lambda: self.after(_STEPS)
+        yield lambda: self.after(0)
+        yield self.gentle_finished
 
     @property
     def fatter_ratio(self) -> float:
@@ -122,7 +135,8 @@ class _BoundaryMaps:
         # Faces that look inward cost the interior more steps than unfolding them beforehand; but
         # where that gets stuck, it leaves needles that no gliding opens again.
         found = self.first if self.first.certificate.certified else self.after(0)
-        return None if found.history[-1].flips else found
+        self.is_unfolded = not found.history[-1].flips
+        return found if self.is_unfolded else None
 
     def folded(self) -> AreaMap | None:
         return None if self.first.certificate.certified else self.first
@@ -130,15 +144,19 @@ class _BoundaryMaps:
     def fatter(self) -> AreaMap:
         return self._unfolded(self.fatter_ratio)
 
-    def gentle(self, ratio: Ratio | float) -> AreaMap | None:
+    def gentle_on_fatter(self) -> AreaMap | None:
+        return self.gentle(self.fatter_ratio, *(more * self.fatter_ratio for more in _LESS_FAT))
+
+    def gentle(self, ratio: Ratio | float, *less_fat: float) -> AreaMap | None:
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
         lost = False
-        for shape in _GENTLE:
-            found = self._chart(ratio, shape)
-            ratios = np.abs(found.distortion.ratios)
-            lost = lost or ratios.min() < _LOST
-            if found.certificate.certified and ratios.min() >= _LOST:
+        tried = [(ratio, shape) for shape in _GENTLE] + [(less, _GENTLE[0]) for less in less_fat]
+        for at, shape in tried:
+            found = self._chart(at, shape)
+            least = np.abs(found.distortion.ratios).min()
+            lost = lost or least < _LOST
+            if found.certificate.certified and least >= _LOST:
                 return found
         return self._unfolded(ratio, _LIGHTER) if lost else None
 

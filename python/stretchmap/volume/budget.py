@@ -40,4 +40,4 @@ class Budget:
     @property
     def spent(self) -> bool:
         """Whether there is none left."""
-        return time.process_time() >= self._end
+        return self.left == 0.0

@@ -29,7 +29,7 @@ from .minimize import minimize
 from .model import History
 from .options import FillOptions, VolumeOptions
 from .problem import Outcome, VolumeProblem
-from .start import START_TOL, started
+from .start import started
 from .untangle import folded_faces, stuck_tets, untangle_patches, untangle_whole
 
 __all__ = ["solve"]
@@ -98,7 +98,7 @@ def solve(
     """
     budget = budget or Budget.of(options, problem.solid.n_tets)
     clock = time.perf_counter()
-    problem = started(problem, solver=options.solver, tol=START_TOL)
+    problem = started(problem, solver=options.solver)
     history = History(problem.model(options), budget.share(patience), progress)
     run = _Run(problem, options, history, budget)
     run.seconds["start"] = time.perf_counter() - clock
@@ -152,9 +152,9 @@ def _keep(run: _Run, x: NDArray[np.float64], glide: bool, otherwise: str) -> boo
 def _untangle(run: _Run, *, glide: bool) -> int:
     """Inverted tets, and tets at folded faces, that are left."""
     history = run.history
-    stuck = _untangle_inside(run)
+    stuck, opened = _untangle_inside(run), None
     if glide:
-        run.x = untangle_whole(history.model, run.x, history, glide=True).x
+        run.x = opened = untangle_whole(history.model, run.x, history, glide=True).x
         stuck = _patched(run, glide=True)
     best, fewest, least = run.problem, len(stuck), _inverted(run)
     for _ in range(_ROUNDS):
@@ -180,6 +180,8 @@ def _untangle(run: _Run, *, glide: bool) -> int:
         if least or not glide:
             return least
         _hold_folded(run)
+    if run.x is opened:
+        return 0
     # Away from folding: the nearer to it, the shorter are all steps that follow.
     away = untangle_whole(history.model, run.x, history, glide=glide)
     if not away.left and not len(stuck_tets(history.model, away.x, glide=glide)):
@@ -254,11 +256,14 @@ def _release(run: _Run) -> bool:
 def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNewton | None]:
     o, history = run.options, run.history
     goal = min(o.frozen_weight, o.volume_weight) if glide else o.volume_weight
+    free = o.free_ratios if isinstance(o, VolumeOptions) else (1.0, 1.0)
     converged, reason, newton = False, "", None
     if not (run.problem.warm and glide):
         with run.timed("frozen"):
             first = o.volume_weight if run.problem.warm else min(1.0, goal)
-            done = minimize(history.model, run.x, history, glide=False, start=first, goal=goal)
+            done = minimize(
+                history.model, run.x, history, glide=False, start=first, goal=goal, free=free
+            )
         run.x, converged, reason = done.x, done.converged, done.reason
         newton = None if glide else done.newton
         del done  # the next stage has a Hessian of its own, and memory need not hold both
@@ -266,8 +271,9 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
         with run.timed("glide"):
             first = o.volume_weight if run.problem.warm else goal
             done = minimize(
-                history.model, run.x, history, glide=True, start=first, goal=o.volume_weight
-            )
+                history.model, run.x, history, glide=True, start=first, goal=o.volume_weight,
+                free=free,
+            )  # fmt: skip
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
             history.budget = run.budget  # proven as it is: worth all the time there is
             with run.timed("release"):
@@ -277,6 +283,7 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
                     done = minimize(
                         history.model, run.x, history, glide=True,
                         start=goal if released else o.volume_weight, goal=o.volume_weight,
+                        free=free,
                     )  # fmt: skip
         converged, reason, newton = done.converged, done.reason, done.newton
         if not _keep(run, done.x, True, "the map with a held boundary is kept"):

@@ -12,6 +12,7 @@ from .options import VolumeOptions
 
 __all__ = ["equalize"]
 
+_WORTHWHILE = 0.1  # share of the error a shift has to take away for another to follow
 _GENTLE = 0.2  # most of its volume that equalizing takes from a tet
 
 
@@ -26,10 +27,10 @@ def equalize(
 ) -> NDArray[np.float64]:
     """Make the volumes between level surfaces of u, v and s those of the source.
 
-    Newton steps at the largest lambda towards the targets of `Marginals`, then its shifts. Both
-    leave vertices in place where the volume of a tet would change by more than a fifth: near
-    slivers, which nothing smooth can move. Should that fold a boundary face, the stage ends with
-    the image before. The recorded energy is `Marginals.error`.
+    Newton steps at the largest lambda towards the targets of `Marginals`, then its shifts, as long
+    as they help. Both leave vertices in place where the volume of a tet would change by more than a
+    fifth: near slivers, which nothing smooth can move. Should that fold a boundary face, the stage
+    ends with the image before. The recorded energy is `Marginals.error`.
 
     Parameters
     ----------
@@ -72,12 +73,18 @@ def equalize(
         state = newton.value(moved, weights)
         if state.flips or state.folds:
             break
+        before, measured = marginals.error(measured), marginals.measure(moved)
+        gain = 1.0 - marginals.error(measured) / before if before > 0.0 else 0.0
+        shifting = iteration >= o.target_iter
+        if shifting and gain <= 0.0:
+            break
         x = moved
-        measured = marginals.measure(x)
         history.add(
             "equalize", iteration + 1, x, energy=marginals.error(measured), step=alpha,
             residual=change, total=total,
         )  # fmt: skip
+        if shifting and gain < _WORTHWHILE:
+            break
     return x
 
 

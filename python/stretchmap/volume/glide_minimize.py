@@ -3,6 +3,7 @@
 As in `minimize`, but the energy has kinks at the edges of the mesh. Along smooth axes steps lead
 far, until pressure against a sloping face spoils them; along those of the faces they always lead
 down, but are cut short by kinks. So the other ones are taken after every short step.
+Both nearly flatten single elements on the way: these are opened after each, see `Relaxation`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from .glide_relax import Relaxation
 from .glide_targets import GlideTargets
 from .minimize import Minimized, grown
 from .model import History, SolidModel
@@ -29,14 +31,14 @@ class _Minimizers:
     def __init__(self, model: SolidModel, x: NDArray[np.float64]) -> None:
         self.smooth = True
         self._made = {True: model.newton(x, glide=True)}
-        self._model, self._asked = model, np.empty(0)
+        self._model, self.asked = model, np.empty(0)
 
     @property
     def chosen(self) -> _core.volume.SolidNewton:
         return self._made[self.smooth]
 
     def ask(self, volumes: NDArray[np.float64]) -> None:
-        self._asked = volumes
+        self.asked = volumes
         for newton in self._made.values():
             newton.set_targets(volumes)
 
@@ -45,7 +47,7 @@ class _Minimizers:
         if self.smooth not in self._made:
             model = dataclasses.replace(self._model, smooth_axes=self.smooth)
             self._made[self.smooth] = model.newton(x, glide=True)
-            self._made[self.smooth].set_targets(self._asked)
+            self._made[self.smooth].set_targets(self.asked)
 
 
 def minimize_on_mesh(
@@ -65,6 +67,7 @@ def minimize_on_mesh(
     """
     o, weight, idle = model.options, start, 0
     minimizers, targets = _Minimizers(model, x), GlideTargets(model)
+    relaxation = Relaxation(model)
     linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg)
     reason, converged = "most iterations done", False
     for iteration in range(1, o.glide_iter + 1):
@@ -75,9 +78,9 @@ def minimize_on_mesh(
         if asked is not None:
             minimizers.ask(asked)
         newton = minimizers.chosen
-        x, step = newton.step(
-            x, _core.volume.EnergyWeights(1.0, weight, 0.0, o.face_weight), linear
-        )
+        weights = _core.volume.EnergyWeights(1.0, weight, 0.0, o.face_weight)
+        x, step = newton.step(x, weights, linear)
+        x = relaxation.relaxed(x, minimizers.asked, weights)
         before, after = step.before.energy / weight, step.after.energy / weight
         history.add(
             "glide", iteration, x, energy=after, step=step.alpha, residual=step.decrement,

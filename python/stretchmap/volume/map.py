@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import time
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..area.map import area_map
-from ..area.result import AreaMap
 from ..base.options import callback, flag, instance
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..certificate.findings import require_certified
 from ..errors import KindError, OptionError
-from ..maps.files import LoadedMap
 from ..maps.result import MapResult
 from ..mesh.given import as_solid, require_same_mesh
 from ..mesh.meshes import TetMesh
 from .boundary_starts import boundary_starts
-from .budget import Budget
-from .engine import solve
+from .certified import certified_map
 from .options import VolumeOptions, balanced, check_call
 from .own import Optimizer, run_optimizer
 from .problem import VolumeProblem
-from .ranked_starts import Start, ranked_starts
+from .ranked_starts import Start
 from .result import VolumeMap, volume_result
 from .vsem import run_vsem
 
@@ -41,11 +37,9 @@ _log = logging.getLogger("stretchmap")
 _BYTES_PER_TET = {"vsem": 600, "certified": 1300}
 # Larger runs say beforehand how much they need.
 _LARGE = 1_000_000
-# Share of the time left that untangling may take, from each start; half of it if that is folded.
-_PATIENCE: tuple[float, ...] = (0.4, 0.6, 0.6, 0.6, 1.0)
-# From a start that has been compared with others: there hardly is a better one.
-_PATIENCE_WITH_BEST = 0.8
-_WORTH_A_START = 0.1  # share of the time; with less left no further one is made
+# Of the area map Algorithm 5.1 starts from. Rings are exact either way; the last per cent of the
+# faces' areas takes most of the time and costs them their shape, and so the tets behind them.
+_BOUNDARY_TOL = 0.02
 
 
 @takes_threads
@@ -57,7 +51,7 @@ def volume_map(
     c: float | None = None,
     balance: float | None = None,
     max_iter: int | None = None,
-    start: AreaMap | VolumeMap | LoadedMap | None = None,
+    start: MapResult | None = None,
     optimizer: Optimizer | None = None,
     options: VolumeOptions | None = None,
     keep_best: bool = False,
@@ -74,8 +68,9 @@ def volume_map(
         ``"certified"``: a bijection with the least volume distortion, proven by a certificate; in
         the end the volumes between level surfaces of u, v and s (with a frozen boundary: of s) are
         made equal to those of the source.
-        ``"vsem"``: Algorithm 5.1 as it stands in the paper; may leave flipped tets, which are
-        reported. Default: ``"vsem"`` if ``c`` is given, else ``"certified"``.
+        ``"vsem"``: Algorithm 5.1 as it stands in the paper, from an `area_map` with ``tol=0.02``;
+        may leave flipped tets, which are reported. Default: ``"vsem"`` if ``c`` is given, else
+        ``"certified"``.
     boundary : {"glide", "frozen"}, optional
         Certified route only. ``"glide"`` (default) lets boundary vertices move on the torus,
         ``"frozen"`` keeps them where the area-preserving map put them.
@@ -83,14 +78,17 @@ def volume_map(
         Regularization constant of (5.6) of the ``"vsem"`` method, dimensionless, default 0.
     balance : float, optional
         Certified route only: from 0, pieces keep their shape, to 1, they keep their volume
-        (default). The volume term weighs ``10^(6 balance - 2)`` times the shape term; below 1 the
-        volumes between level surfaces are left as they come. Where all tets are stretched along an
-        axis more than three times, shape is that of the solid with this undone.
+        (default). From 0.5 on the volume term weighs ``10^(6 balance - 2)`` times the shape term;
+        towards 0 it weighs 30 times and leaves ratios between 0.3 and 1.2 free, so that no part
+        grows much for the sake of angles. For angles alone give no balance, but
+        ``VolumeOptions(volume_weight=0.01)``. Below 1 the volumes between level surfaces are left
+        as they come. Where all tets are stretched along an axis more than three times, shape is
+        that of the solid with this undone.
     max_iter : int, optional
         Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
-    start : AreaMap, VolumeMap or LoadedMap, optional
-        A map of ``solid.surface`` to prescribe the boundary, or a map of ``solid``, or of its
-        refinement, to go on from.
+    start : MapResult, optional
+        Any map to a torus: of ``solid.surface``, to prescribe the boundary, or of ``solid``, or of
+        its refinement, to go on from. What an optimizer of your own returned is one, too.
     optimizer : callable, optional
         ``optimizer(solid, image, torus)`` returns a better image, see `Optimizer`: a method of your
         own in place of ours, from the same start, measured and certified alike.
@@ -179,7 +177,7 @@ def volume_map(
         )  # fmt: skip
     solid.require_solid_torus()
     if start is not None:
-        instance("start", start, MapResult, "a map of this solid")
+        instance("start", start, MapResult, "a map of this solid; for an image see optimizer")
     if method == "vsem":
         return _paper_map(solid, start, options, c or 0.0, max_iter, progress)
     if max_iter is not None:
@@ -190,61 +188,18 @@ def volume_map(
         result = _own_map(solid, start, options, optimizer, progress)
     else:
         glide = boundary != "frozen"
-        result = _certified_map(solid, start, options, glide=glide, progress=progress)
+        begin = None if start is None else Start(start, _problem(solid, start, options.refine))
+        result = certified_map(solid, options, begin, glide=glide, progress=progress)
     _warn(result)
     if not keep_best:
         require_certified(result.certificate, "the map")
     return result
 
 
-def _certified_map(
-    solid: TetMesh,
-    start: MapResult | None,
-    options: VolumeOptions,
-    *,
-    glide: bool,
-    progress: Progress | None,
-) -> VolumeMap:
-    """The map from the first start that leads to a certified one, or the best there is."""
-    budget = Budget.of(options, solid.n_tets)
-    if start is None:
-        starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)
-        patience = _PATIENCE
-    else:
-        starts, patience = iter([Start(start, _problem(solid, start, options))]), (1.0,)
-    best, clock, vain = None, time.perf_counter(), 0.0
-    for begin, share in zip(starts, patience, strict=False):
-        if begin.others:
-            share = _PATIENCE_WITH_BEST
-        if start is None and not _unfolded(begin.map):
-            share *= 0.5
-        outcome = solve(
-            begin.problem, options, glide=glide, budget=budget, patience=share, progress=progress
-        )
-        outcome.seconds["start"] += begin.seconds
-        vain += begin.others
-        found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
-        if best is None or _better(found, best):
-            best = found
-        if best.certificate.certified or budget.left < _WORTH_A_START * budget.seconds:
-            break
-        if not best.certificate.checks.get("source_embedded", True):
-            break  # no start mends the source
-        vain = time.perf_counter() - clock
-        _log.info("not certified (%s): once more from another start", best.certificate.reason)
-    assert best is not None
-    if not vain:
-        return best
-    return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
-
-
-def _problem(solid: TetMesh, start: MapResult, options: VolumeOptions) -> VolumeProblem:
+def _problem(solid: TetMesh, start: MapResult, refine: bool | None) -> VolumeProblem:
     image, torus = _start_of(solid, start)
-    return VolumeProblem.of(solid, image, torus=torus, refine=options.refine)
-
-
-def _unfolded(start: MapResult) -> bool:
-    return isinstance(start, AreaMap) and start.certificate.certified
+    warm = isinstance(start.mesh, TetMesh)
+    return VolumeProblem.of(solid, image, torus=torus, refine=refine, warm=warm)
 
 
 def _own_map(
@@ -257,7 +212,7 @@ def _own_map(
     """The map an optimizer of the user's own makes of the first start."""
     if start is None:
         start = next(boundary_starts(solid, options, glide=False, progress=progress))
-    problem = _problem(solid, start, options)
+    problem = _problem(solid, start, options.refine)
     outcome = run_optimizer(problem, optimizer, solver=options.solver)
     name = getattr(optimizer, "__name__", type(optimizer).__name__)
     return volume_result(outcome, name, "own", start)
@@ -275,23 +230,13 @@ def _paper_map(
     if start is None:
         start = area_map(
             solid.surface, ratio=options.ratio or "conformal", phase=options.phase,
-            keep_best=True, progress=progress,
+            tol=_BOUNDARY_TOL, keep_best=True, progress=progress,
         )  # fmt: skip
-    image, torus = _start_of(solid, start)
-    problem = VolumeProblem.of(solid, image, torus=torus, refine=None)
+    problem = _problem(solid, start, None)
     outcome = run_vsem(problem, options, c=c, max_iter=max_iter, progress=progress)
     result = volume_result(outcome, "vsem", "frozen", start)
     _warn(result)
     return result
-
-
-def _better(one: VolumeMap, other: VolumeMap) -> bool:
-    """Certified, or else with fewer flipped tets."""
-
-    def rank(result: VolumeMap) -> tuple[bool, int]:
-        return result.certificate.certified, -int(result.distortion.flips or 0)
-
-    return rank(one) > rank(other)
 
 
 def _warn(result: VolumeMap) -> None:

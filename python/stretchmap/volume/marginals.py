@@ -27,6 +27,7 @@ from ..base.torus import TWO_PI, Torus
 __all__ = ["Marginals"]
 
 _BINS = (8, 64)
+_RELAXED = 1.5  # times what is missing: the minimizer gives way by a part of what it is asked
 _TARGETS = (0.8, 1.25)  # what more is missing is beyond a correction
 
 
@@ -109,9 +110,10 @@ class Marginals:
         """Update the multipliers; the volume (k,) to ask of each tet, relative to its share."""
         targets = np.ones(len(self.T))
         for m, table in zip(marginals, self.multipliers, strict=True):
-            table += np.divide(
+            missing = np.divide(
                 m.source - m.image, m.source, where=m.source > 0.0, out=np.zeros_like(table)
             )
+            table += _RELAXED * missing
             targets += _core.volume.level_lookup(
                 self.T, m.values, table, m.period, m.period == TWO_PI
             )

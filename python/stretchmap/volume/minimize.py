@@ -14,12 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from .glide_relax import Relaxation
 from .model import History, SolidModel
 from .options import FillOptions
 
 __all__ = ["Minimized", "grown", "minimize"]
 
 _SERVED = 0.5  # a shorter step shows that a Hessian is too old
+# After a step that was promised much and cut shorter than that, so many more prove nothing: where
+# single elements fill the gradient, the solver sees nothing else.
+_CUT, _DOUBT = 1e-2, 5
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
@@ -68,6 +72,27 @@ class _Sharing:
         self.kept = 0 if renew else (self.kept + 1) % self.shared
 
 
+@dataclass
+class _Standstill:
+    """Whether a step shows that there is nothing left to gain.
+
+    One that few tets cut short, or from a poor solve, gains little and proves nothing; nor do those
+    that follow one that was promised much.
+    """
+
+    doubt: int = 0
+
+    def shown(self, step: _core.volume.NewtonReport, enough: float) -> bool:
+        """Of a step of which a gain of ``enough`` would be worth while."""
+        predicted = 0.5 * step.decrement
+        if step.alpha < _CUT and predicted > enough:
+            self.doubt = _DOUBT
+        else:
+            self.doubt = max(self.doubt - 1, 0)
+        gain = max(step.before.energy - step.after.energy, predicted)
+        return gain <= enough and not step.negative_curvature and not self.doubt
+
+
 def grown(weight: float, alpha: float, growth: float, goal: float) -> float:
     """Lambda after a step of length ``alpha``; slower where single tets cut steps short: what is
     left to shape then is lost."""
@@ -82,6 +107,7 @@ def minimize(
     glide: bool,
     start: float,
     goal: float,
+    free: tuple[float, float] = (1.0, 1.0),
 ) -> Minimized:
     """Newton steps with lambda growing from ``start`` to ``goal``; no tet turns over.
 
@@ -95,6 +121,9 @@ def minimize(
     glide : bool
         Whether boundary vertices move on the torus.
     start, goal : float
+    free : (float, float)
+        Ratios of volumes, relative to what is asked for, that cost nothing. Before every step each
+        tet is asked for the volume between them closest to its own, which lowers the energy.
     """
     o = model.options
     stage, total, tolerance, face = (
@@ -107,7 +136,9 @@ def minimize(
     newton = model.newton(x, glide=glide)
     if not glide:
         newton.set_targets(model.targets)
-    weight, sharing = start, _Sharing(o.shared)
+    weight, sharing, standstill = start, _Sharing(o.shared), _Standstill()
+    relaxation = Relaxation(model) if glide else None
+    asked = goals = np.ones(len(model.T)) if glide else model.targets
     for iteration in range(1, total + 1):
         if history.budget.spent:
             return Minimized(x, False, "the time limit was reached", newton)
@@ -118,15 +149,18 @@ def minimize(
             keep_hessian=sharing.kept > 0,
             negative=_NEGATIVE if weight >= o.volume_weight else 0.0,
         )
+        if free != (1.0, 1.0):
+            ratios = _core.mesh.tet_volumes(x, model.T) / _core.mesh.tet_volumes(model.V, model.T)
+            goals = asked * np.clip(ratios / asked, *free)
+            newton.set_targets(goals)
         x, step = newton.step(x, weights, linear)
+        if relaxation is not None and step.alpha < _SERVED:
+            x = relaxation.relaxed(x, goals, weights)
         before, after = step.before.energy / weight, step.after.energy / weight
         history.add(
             stage, iteration, x, energy=after, step=step.alpha, residual=step.decrement, total=total
         )
-        # A step that few tets cut short, or from a poor solve, gains little and proves nothing.
-        predicted = 0.5 * step.decrement / weight
-        enough = tolerance * min(before, fair)
-        small = max(before - after, predicted) <= enough and not step.negative_curvature
+        small = standstill.shown(step, weight * tolerance * min(before, fair))
         if weight < goal:
             if step.alpha >= _SERVED:
                 weight = grown(weight, step.alpha, o.growth, goal)

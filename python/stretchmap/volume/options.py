@@ -6,18 +6,29 @@ import dataclasses
 from dataclasses import dataclass
 
 from ..area.search import Ratio
-from ..base.options import SOLVERS, flag, instance, one_of, real, whole
+from ..base.options import SOLVERS, flag, instance, one_of, real, shown, whole
 from ..errors import OptionError
 
-__all__ = ["FillOptions", "VolumeOptions", "balanced", "check_call", "weight_at"]
+__all__ = ["FillOptions", "VolumeOptions", "balanced", "check_call", "free_at", "weight_at"]
 
 
-_LEAST_WEIGHT, _MOST_WEIGHT = 1e-2, 1e4  # of the volume term; beyond them nothing changes
+_MOST_WEIGHT = 1e4  # of the volume term; beyond it nothing changes
+_EVEN_WEIGHT = 10.0  # half-way to shape
+# At the end of shape: ratios between these are free, and others cost more than half-way.
+_SHAPE_WEIGHT, _SHAPE_RATIOS = 30.0, (0.3, 1.2)
 
 
 def weight_at(balance: float) -> float:
-    """``volume_weight`` between pure shape, 0, and pure volume, 1."""
-    return float(_LEAST_WEIGHT * (_MOST_WEIGHT / _LEAST_WEIGHT) ** balance)
+    """``volume_weight`` between shape, 0, and volume, 1."""
+    if balance < 0.5:
+        return float(_SHAPE_WEIGHT * (_EVEN_WEIGHT / _SHAPE_WEIGHT) ** (2.0 * balance))
+    return float(1e-2 * 1e6**balance)
+
+
+def free_at(balance: float) -> tuple[float, float]:
+    """``free_ratios`` there."""
+    least, most = (ratio ** max(1.0 - 2.0 * balance, 0.0) for ratio in _SHAPE_RATIOS)
+    return least, most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +131,9 @@ class VolumeOptions(FillOptions):
 
     Attributes
     ----------
+    free_ratios : (float, float)
+        Least and largest volume ratio of a tet that cost nothing, 1 between them: the volume term
+        measures how far a ratio is outside.
     ratio : "conformal", "search" or float, optional
         R / r of the torus, as in `area_map`. Default: the conformal one for ``"vsem"``, a search
         for ``"certified"``.
@@ -147,10 +161,11 @@ class VolumeOptions(FillOptions):
     2.5
     """
 
+    free_ratios: tuple[float, float] = (1.0, 1.0)
     ratio: Ratio | float | None = None
     phase: float | None = None
     tol: float | None = None
-    target_iter: int = 8
+    target_iter: int = 5
     shift_iter: int = 4
     marginal_tol: float = 1e-4
     vertex_exact: bool = False
@@ -159,6 +174,11 @@ class VolumeOptions(FillOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         flag("vertex_exact", self.vertex_exact)
+        instance("free_ratios", self.free_ratios, tuple, "the least and the most")
+        if len(self.free_ratios) != 2:
+            raise OptionError(f"free_ratios must be two numbers, got {shown(self.free_ratios)}")
+        real("free_ratios[0]", self.free_ratios[0], 0.0, 1.0)
+        real("free_ratios[1]", self.free_ratios[1], 1.0)
         if isinstance(self.ratio, str):
             one_of("ratio", self.ratio, ("conformal", "search"))
         elif self.ratio is not None:
@@ -200,14 +220,20 @@ def check_call(
 
 
 def balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOptions:
-    """The options for a setting between pure shape and pure volume."""
+    """The options for a setting between shape and volume."""
     balance = real("balance", balance, 0.0, 1.0)
     if method == "vsem":
         raise OptionError("balance belongs to the certified route; leave c and method out")
     if options.volume_weight != VolumeOptions.volume_weight:
         raise OptionError("give balance or options.volume_weight, not both")
+    if options.free_ratios != VolumeOptions.free_ratios:
+        raise OptionError("give balance or options.free_ratios, not both")
     if balance == 1.0:
         return options
     return dataclasses.replace(
-        options, volume_weight=weight_at(balance), target_iter=0, shift_iter=0
+        options,
+        volume_weight=weight_at(balance),
+        free_ratios=free_at(balance),
+        target_iter=0,
+        shift_iter=0,
     )

@@ -79,6 +79,7 @@ class VolumeProblem:
         ground: TriMesh | None = None,
         pinned: NDArray[np.int32] | None = None,
         refine: bool | None = True,
+        warm: bool = False,
     ) -> VolumeProblem:
         """Of an image of the boundary vertices (nb, 3), or of all vertices (n, 3) to go on from.
 
@@ -94,6 +95,8 @@ class VolumeProblem:
             Boundary vertices that do not glide on it.
         refine : bool or None
             Whether overconstrained elements are split or refused; None: neither.
+        warm : bool
+            Whether the image is of all vertices. Their number does not tell, where none is inside.
 
         Raises
         ------
@@ -108,7 +111,6 @@ class VolumeProblem:
         elif refine is not None:
             _refuse_overconstrained(solid)
         mesh = solid if refinement is None else refinement.solid
-        warm = len(image) == solid.n_vertices
         ids = solid.boundary_vertices
         boundary = image[ids] if warm else image
         enclosed = float(_core.mesh.enclosed_volume(boundary, solid.surface.F))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,25 +17,30 @@ from .boundary_starts import boundary_starts
 from .budget import Budget
 from .options import VolumeOptions
 from .problem import VolumeProblem
-from .start import START_TOL, started
+from .start import started
 
 __all__ = ["Start", "ranked_starts"]
 
 # Share of tets the harmonic map turns over from which on it tells more about a start than the order
 # in which they are made: of a thin shell it is a fifth from one, and a thousandth from another.
-_MANY = 0.05
-_COMPARED = 4
-_COMPARING = 0.3  # share of the time left that may go into them, each as dear as the first
+_MANY, _FEW = 0.05, 0.01
+_COMPARED = 4  # unless one before turns few over
+_COMPARING = 0.3  # share of the time left that may go into them
+# Share of the time left that untangling may take from each in turn; half of it if the boundary is
+# folded, more if it has been compared with others, as there hardly is a better one then.
+_PATIENCE = (0.4, 0.6, 0.6, 0.6, 1.0)
+_PATIENCE_WITH_BEST = 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A boundary map, or a whole one, and the problem that begins from it."""
+    """A map of the boundary or of all, and the problem that begins from it."""
 
     map: MapResult
     problem: VolumeProblem
-    seconds: float = 0.0  # the harmonic map took
-    others: float = 0.0  # seconds of those it was compared with
+    patience: float = 1.0  # share of the time left that untangling may take
+    seconds: float = 0.0  # that the harmonic map took
+    others: float = 0.0  # seconds that those took it was compared with
 
     @property
     def inverted(self) -> float:
@@ -60,23 +66,32 @@ def ranked_starts(
         for found in boundary_starts(solid, options, glide=glide, progress=progress):
             clock = time.perf_counter()
             problem = VolumeProblem.of(solid, found.image, torus=found.torus, refine=options.refine)
-            problem = started(problem, solver=options.solver, tol=START_TOL)
-            yield Start(found, problem, time.perf_counter() - clock)
+            problem = started(problem, solver=options.solver)
+            patience = 1.0 if found.certificate.certified else 0.5
+            yield Start(found, problem, patience, time.perf_counter() - clock)
 
-    starts = begun()
-    first = next(starts)
-    if glide and first.inverted > _MANY:
-        made, allowed = budget.seconds - budget.left, budget.share(_COMPARING)
-        few, clock = [first], time.perf_counter()
-        while len(few) < _COMPARED and allowed.left > made:
-            other = next(starts, None)
-            if other is None:
-                break
+    starts = _best_first(begun(), budget) if glide else begun()
+    for start, share in zip(
+        starts, itertools.chain(_PATIENCE, itertools.repeat(1.0)), strict=False
+    ):
+        share = _PATIENCE_WITH_BEST if start.others else share
+        yield replace(start, patience=start.patience * share)
+
+
+def _best_first(starts: Iterator[Start], budget: Budget) -> Iterator[Start]:
+    """As they come, but for the first few; those are no more than time allows, if each takes as
+    long as the one before."""
+    few = [next(starts)]
+    if few[0].inverted > _MANY:
+        made, clock = budget.seconds - budget.left, time.perf_counter()
+        allowed, others = budget.share(_COMPARING), itertools.islice(starts, _COMPARED - 1)
+        while made < (left := allowed.left) and (other := next(others, None)) is not None:
             few.append(other)
-        spent = time.perf_counter() - clock if len(few) > 1 else 0.0
-        best, *rest = sorted(few, key=lambda start: start.inverted)
-        yield replace(best, others=spent)
-        yield from rest
-    else:
-        yield first
+            if other.inverted <= _FEW:
+                break
+            made = left - allowed.left
+        if len(few) > 1:
+            few.sort(key=lambda start: start.inverted)
+            few[0] = replace(few[0], others=time.perf_counter() - clock)
+    yield from few
     yield from starts

@@ -11,9 +11,9 @@ from .. import _core
 from .model import face_areas
 from .problem import VolumeProblem
 
-__all__ = ["START_TOL", "boundary_scale", "started"]
+__all__ = ["boundary_scale", "started"]
 
-START_TOL = 1e-4  # residual of a harmonic map that is only to be improved
+_TOL = 1e-4  # a harmonic map that is only to be improved need not be exact
 
 _EVEN = 0.2  # logarithm: a boundary image whose scale varies less has one scale
 _SCALE_TOL = 1e-3
@@ -53,7 +53,7 @@ def _warmed(
     return x
 
 
-def started(problem: VolumeProblem, *, solver: str, tol: float) -> VolumeProblem:
+def started(problem: VolumeProblem, *, solver: str, tol: float = _TOL) -> VolumeProblem:
     """Image and scale of the inner vertices: both harmonic, by those of the boundary.
 
     Parameters

@@ -222,12 +222,13 @@ def patches_round(
     rows = np.flatnonzero(free[T].any(axis=1))
     corners = T[rows]
     inside = free[corners]
+    # Tets and the free vertices they share: parts of this graph are patches.
     owner = np.broadcast_to(np.arange(len(rows))[:, None], corners.shape)[inside]
-    size = (len(rows), len(model.V))
-    links = coo_matrix((np.ones(len(owner), np.int8), (owner, corners[inside])), shape=size).tocsr()
-    count, label = connected_components(links @ links.T, directed=False)
+    n = len(rows) + len(model.V)
+    links = coo_matrix((np.ones(len(owner), np.int8), (owner, len(rows) + corners[inside])), (n, n))
+    label = connected_components(links, directed=False)[1][: len(rows)]
     found = []
-    for part in range(count):
+    for part in np.unique(label):
         members = rows[label == part]
         vertices = np.unique(T[members])
         found.append(Patch(members, vertices, np.where(free[vertices], motion[vertices], FIXED)))

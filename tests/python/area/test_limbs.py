@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 import stretchmap as sm
 from shapes import with_branch, with_limb
 from stretchmap import _core
+from stretchmap.area import finish
 from stretchmap.area import map as area
 from stretchmap.area.flat import unfolded_turns
 from stretchmap.errors import CertificationError, SolverError
@@ -83,3 +86,16 @@ def test_areas_give_way_where_they_would_fold_faces(monkeypatch, n_tets, rings):
     monkeypatch.setattr(area, "SHAPES", ())
     with pytest.raises(CertificationError, match="folded"):
         sm.area_map(surface)
+
+
+@pytest.mark.parametrize(("lengths", "taken"), [((1e-4,), 10), ((1e-4,) * 9 + (0.5,), 100)])
+def test_unfolding_that_is_jammed_ends(monkeypatch, lengths, taken):
+    """Ten steps in a row that hardly move show that no other will; a longer one shows it moves."""
+    monkeypatch.setattr(finish, "_record", lambda *_: SimpleNamespace(flips=1))
+    given = itertools.cycle(lengths)
+    newton = SimpleNamespace(
+        least_facing=lambda: -0.1,
+        step=lambda _: SimpleNamespace(step=next(given)),
+        measures=lambda: None,
+    )
+    assert len(finish.unfold_faces(newton, None)) == taken

@@ -24,7 +24,7 @@ def test_there_are_the_families_asked_for(room):
     assert all(family.name == name for name, family in families().items())
 
 
-@pytest.mark.parametrize("name", ["raw_tubes", "thorny"])
+@pytest.mark.parametrize("name", ["raw_tubes", "thorny", "cut_grids"])
 def test_a_seed_is_a_solid_torus_and_always_the_same(name):
     from families import families
 

@@ -104,7 +104,9 @@ def test_the_frozen_map_is_kept_where_gliding_crosses(pair, maps, monkeypatch, c
 
 def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
     held = maps["frozen"]
-    problem = VolumeProblem.of(held.mesh, held.image, ground=pair.target.surface, refine=None)
+    problem = VolumeProblem.of(
+        held.mesh, held.image, ground=pair.target.surface, refine=None, warm=True
+    )
     model = problem.model(FillOptions())
     history = engine.History(model, engine.Budget(60.0))
     some = held.mesh.boundary_vertices[[3, 50, 200]].astype(np.intp)
@@ -138,7 +140,7 @@ def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps):
     tree = _core.maps.SurfaceTree(goal.V, goal.F)
     image[ids[vertex]] = tree.closest(past[None])[0][0]
     pinned = pair.source_landmarks.astype(np.int32)
-    problem = VolumeProblem.of(held.mesh, image, ground=goal, pinned=pinned, refine=None)
+    problem = VolumeProblem.of(held.mesh, image, ground=goal, pinned=pinned, refine=None, warm=True)
     options, model = FillOptions(), problem.model(FillOptions())
     history = engine.History(model, engine.Budget(60.0))
     stuck = stuck_tets(model, problem.x, glide=False)
@@ -157,7 +159,9 @@ def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps):
 
 def test_targets_ask_for_what_is_missing_and_no_more(pair, maps):
     held = maps["frozen"]
-    problem = VolumeProblem.of(held.mesh, held.image, ground=pair.target.surface, refine=None)
+    problem = VolumeProblem.of(
+        held.mesh, held.image, ground=pair.target.surface, refine=None, warm=True
+    )
     model = problem.model(FillOptions())
     asked = model.inflating(1.0)
     assert model.shares @ asked == pytest.approx(problem.ground.volume)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from shapes import RING, cubes
 from stretchmap.volume.anisotropy import unstretching
 
 SOLID = sm.samples.bumpy_torus(1500)
@@ -18,6 +19,17 @@ def stretched(matrix: np.ndarray) -> sm.TetMesh:
 def test_an_even_mesh_is_left_alone():
     assert unstretching(SOLID.V, SOLID.T) is None
     assert unstretching(SOLID.V * [2.0, 1.0, 1.0], SOLID.T) is None
+
+
+def test_cubes_cut_along_their_diagonals_are_even():
+    """Every tet begins at the corner its cube's diagonal leaves from."""
+    assert unstretching(*cubes(RING)) is None
+
+
+def test_the_order_of_a_tets_corners_does_not_count():
+    V = SOLID.V * [40.0, 1.0, 1.0]
+    turned = np.ascontiguousarray(SOLID.T[:, [2, 0, 1, 3]])
+    assert unstretching(V, turned) == pytest.approx(unstretching(V, SOLID.T), rel=1e-3)
 
 
 @pytest.mark.parametrize("factors", [(100.0, 1.0, 1.0), (1.0, 30.0, 1.0), (40.0, 1.0, 900.0)])

@@ -35,6 +35,41 @@ def test_held_boundaries_are_balanced_too():
     assert shape.distortion.element_std > volume.distortion.element_std
 
 
+def test_at_the_end_of_shape_no_part_grows_for_the_sake_of_angles():
+    """Parts of a grid in the image that grew are small where they came from."""
+    solid = sm.samples.vertebra_like(4000)
+
+    def by_weight(weight):
+        options = sm.VolumeOptions(volume_weight=weight, target_iter=0, shift_iter=0)
+        return sm.volume_map(solid, options=options).distortion
+
+    shape, angles, half = (
+        sm.volume_map(solid, balance=0.0).distortion,
+        by_weight(0.01),
+        by_weight(10),
+    )
+    assert angles.angle_mean < shape.angle_mean < half.angle_mean
+    assert shape.ratio_max < 0.9 * half.ratio_max and shape.ratio_max < 0.3 * angles.ratio_max
+
+
+def test_ratios_that_are_free_cost_nothing():
+    """All of them: what is left is the shape, as if volumes hardly counted."""
+
+    def angle(**options):
+        given = sm.VolumeOptions(target_iter=0, shift_iter=0, frozen_tol=1e-5, **options)
+        return sm.volume_map(SOLID, boundary="frozen", options=given).distortion.angle_mean
+
+    free = angle(volume_weight=100.0, free_ratios=(1e-9, 1e9))
+    assert free == pytest.approx(angle(volume_weight=1e-6), rel=2e-3)
+    assert angle(volume_weight=100.0) > 1.01 * free
+
+
+@pytest.mark.parametrize("pair", [(1.1, 2.0), (0.5, 0.9), (-0.1, 2.0), (0.5,), 1.0, (0.5, "a")])
+def test_free_ratios_are_a_range_round_one(pair):
+    with pytest.raises(OptionError, match="free_ratios"):
+        sm.VolumeOptions(free_ratios=pair)
+
+
 def test_areas_are_balanced():
     surface = sm.samples.vertebra_like(2000).surface
     found = [sm.area_map(surface, balance=b, keep_best=True) for b in (0.0, 0.3)]
@@ -58,6 +93,8 @@ def test_one_way_of_asking_at_a_time():
         sm.volume_map(SOLID, c=1.0, balance=0.5)
     with pytest.raises(OptionError, match="not both"):
         sm.volume_map(SOLID, balance=0.5, options=sm.VolumeOptions(volume_weight=2.0))
+    with pytest.raises(OptionError, match="not both"):
+        sm.volume_map(SOLID, balance=0.5, options=sm.VolumeOptions(free_ratios=(0.5, 2.0)))
 
 
 def test_the_picture_shows_every_map(maps):

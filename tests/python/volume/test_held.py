@@ -11,8 +11,7 @@ import stretchmap as sm
 from shapes import with_branch
 from stretchmap.area.map import finished
 from stretchmap.volume import boundary_starts as boundary_starts_module
-from stretchmap.volume import engine
-from stretchmap.volume import map as volume_module
+from stretchmap.volume import certified, engine
 from stretchmap.volume.boundary_starts import boundary_starts
 from stretchmap.volume.budget import Budget
 from stretchmap.volume.minimize import minimize
@@ -76,7 +75,7 @@ def test_a_needle_mesh_has_no_slivers(problem):
 def failing(monkeypatch, times: int) -> list[np.ndarray]:
     """Lets the first solves end with inverted tets, and lists the images all began with."""
     tried: list[np.ndarray] = []
-    solve = volume_module.solve
+    solve = certified.solve
 
     def fails(problem, options, **keywords):
         tried.append(problem.x.copy())
@@ -87,7 +86,7 @@ def failing(monkeypatch, times: int) -> list[np.ndarray]:
             return dataclasses.replace(found, problem=dataclasses.replace(found.problem, x=x))
         return found
 
-    monkeypatch.setattr(volume_module, "solve", fails)
+    monkeypatch.setattr(certified, "solve", fails)
     return tried
 
 
@@ -155,6 +154,30 @@ def test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monk
         problem, VolumeOptions(), glide=True, budget=Budget(600.0), patience=1e-6
     )
     assert outcome.converged and not len(outcome.problem.held)
+
+
+def test_one_that_cannot_be_released_is_gone_on_with_all_the_same(problem, monkeypatch):
+    test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monkeypatch)
+    monkeypatch.setattr(engine, "_release", lambda run: False)
+    outcome = engine.solve(
+        problem, VolumeOptions(), glide=True, budget=Budget(600.0), patience=1e-6
+    )
+    assert outcome.converged and len(outcome.problem.held) == 9
+
+
+def test_what_gliding_has_untangled_is_not_untangled_once_more(problem, monkeypatch):
+    """Nor is a map that stays short of the floor, which the second time would search in vain."""
+    called = []
+    untangle = engine.untangle_whole
+
+    def counted(*arguments, glide, **keywords):
+        called.append(glide)
+        return untangle(*arguments, glide=glide, **keywords)
+
+    monkeypatch.setattr(engine, "untangle_whole", counted)
+    options = VolumeOptions(floor=0.9)
+    assert engine.solve(problem, options, glide=True, budget=Budget(600.0)).converged
+    assert called == [False, True]
 
 
 def test_folded_faces_are_better_than_inverted_tets(problem, monkeypatch):

@@ -79,7 +79,8 @@ def test_targets_ask_for_what_is_missing_and_add_up(solid, axis):
     # Exact up to the width of a bin; the distortion is a function of one coordinate.
     assert np.corrcoef(targets, ratio)[0, 1] > 0.8
     again = tool.targets(tool.measure(moved))
-    assert np.allclose(again - 1.0, 2.0 * (targets - 1.0), atol=1e-12)
+    assert targets.min() > 0.8 and targets.max() < 1.25
+    assert np.allclose(again, np.clip(2.0 * targets - 1.0, 0.8, 1.25), atol=1e-12)
 
 
 def test_targets_are_reached_by_the_energy(solid):

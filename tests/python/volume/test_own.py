@@ -102,3 +102,10 @@ def test_a_refined_map_starts_one_of_the_input():
     assert again.mesh.n_vertices >= thin.n_vertices
     with pytest.raises(KindError):
         sm.volume_map(SOLID, start=first)
+
+
+def test_an_image_is_no_start_and_the_error_names_the_way() -> None:
+    with pytest.raises(OptionError, match="for an image see optimizer"):
+        sm.volume_map(SOLID, start=SOLID.V)
+    begun = sm.conformal_map(SOLID.surface)
+    assert sm.volume_map(SOLID, start=begun).certificate.certified

@@ -12,6 +12,7 @@ import pytest
 import scipy.sparse as sp
 
 import stretchmap as sm
+from shapes import mug
 from stretchmap import _core, samples
 from stretchmap.errors import DegenerateError, KindError, OptionError
 from stretchmap.mesh.meshes import TetMesh
@@ -179,6 +180,16 @@ def test_vsem_energy_falls_at_every_step_and_flips_are_reported(bumpy):
     assert not result.converged and result.stop_reason == "most iterations done"
 
 
+def test_algorithm_starts_from_rings_of_exact_area(bumpy):
+    """Its boundary map is an area map whose faces, not its rings, are a little less exact."""
+    boundary = sm.area_map(bumpy.surface, tol=0.02)
+    rings = boundary.distortion.ring_std
+    own = sm.volume_map(bumpy, c=10.0, max_iter=3)
+    given = sm.volume_map(bumpy, c=10.0, max_iter=3, start=boundary)
+    assert rings < 1e-6
+    assert (own.image == given.image).all()
+
+
 def test_a_large_run_says_how_much_memory_it_needs(bumpy, caplog, monkeypatch):
     caplog.set_level("INFO", "stretchmap")
     sm.volume_map(bumpy, c=10.0, max_iter=0)
@@ -233,6 +244,18 @@ def test_going_on_from_a_saved_map_lowers_the_distortion_further(bumpy, tmp_path
     assert again.certificate.certified
     assert again.distortion.element_error_mean < first.distortion.element_error_mean
     assert {record.stage for record in again.history} == {"glide", "equalize"}
+
+
+def test_a_boundary_map_is_no_map_of_all_where_no_vertex_is_inside():
+    """Taken for one, it had its volumes asked for before its shapes: SD 2.1, at rest."""
+    solid = mug(7, 1, 7)
+    assert len(solid.boundary_vertices) == solid.n_vertices
+    start = sm.area_map(solid.surface, ratio=1.5, keep_best=True)
+    result = sm.volume_map(solid, start=start)
+    assert result.converged and "frozen" in {record.stage for record in result.history}
+    assert result.distortion.element_std < 0.2
+    again = sm.volume_map(result.mesh, start=result)
+    assert "frozen" not in {record.stage for record in again.history}
 
 
 def test_a_tangled_start_is_untangled(bumpy):
