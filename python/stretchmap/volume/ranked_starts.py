@@ -79,11 +79,12 @@ def ranked_starts(
 
 
 def _best_first(starts: Iterator[Start], budget: Budget) -> Iterator[Start]:
-    """As they come, but for the first few; those are no more than time allows, if each takes as
-    long as the one before."""
+    """As they come, but for the first few; those are two, and no more than time allows, if each
+    takes as long as the one before. How long the first took tells nothing: it includes the search
+    for a torus."""
     few = [next(starts)]
     if few[0].inverted > _MANY:
-        made, clock = budget.seconds - budget.left, time.perf_counter()
+        made, clock = 0.0, time.perf_counter()
         allowed, others = budget.share(_COMPARING), itertools.islice(starts, _COMPARED - 1)
         while made < (left := allowed.left) and (other := next(others, None)) is not None:
             few.append(other)
