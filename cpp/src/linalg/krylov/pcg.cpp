@@ -78,7 +78,10 @@ struct Run {
   double energy_share;
   Scalars<K> goal{};  // squared residual aimed at
   Scalars<K> rr{};
-  Scalars<K> gained{}, last{};  // twice what all steps, and the last, lowered the quadratic by
+  Scalars<K> gained{};  // twice what all steps lowered the quadratic by
+  // What the last did, or was promised by the preconditioner: where that is poor, single stiff rows
+  // shorten steps that all others wait for, and little gained tells nothing.
+  Scalars<K> last{};
   PcgResult<K> result{};
 
   bool done(int k) const {
@@ -149,8 +152,8 @@ struct Run {
           return;
         }
         alpha[k] = rz[k] / pq[k];
-        last[k] = alpha[k] * rz[k];
-        gained[k] += last[k];
+        last[k] = std::max(alpha[k], 1.0) * rz[k];
+        gained[k] += alpha[k] * rz[k];
       }
       rr = advance<K>(n, alpha, p.data(), q.data(), x, r.data(), r_f.data());
       if (!(result.finite = all_finite<K>(rr))) return;
