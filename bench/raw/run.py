@@ -76,7 +76,7 @@ def _command(arguments: list[str]) -> str:
     """What a command says where it fails; empty where not."""
     try:
         run = subprocess.run(
-            [sys.executable, "-m", "stretchmap.cli", *arguments],
+            [sys.executable, "-m", "stretchmap", *arguments],
             capture_output=True, text=True, timeout=LIMIT, env=os.environ, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:

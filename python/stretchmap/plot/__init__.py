@@ -116,7 +116,9 @@ def picture(result: MapResult, kind: Kind, **options: Any) -> Figure:
     MeshError, OptionError
         As the function.
     """
-    one_of("kind", kind, tuple(KINDS))
+    if not isinstance(kind, str) or kind not in KINDS:
+        # Those of this map; asked for one of another map's, the function says what it lacks.
+        one_of("kind", kind, kinds(result))
     for option in options:
         if option not in inspect.signature(KINDS[kind]).parameters:
             raise OptionError(f"a picture of kind {kind!r} has no option {option!r}")

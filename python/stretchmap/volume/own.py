@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..base.arrays import as_reals
 from ..base.torus import Torus
-from ..errors import OrientationError
+from ..errors import ArrayError, OrientationError
 from ..mesh.meshes import TetMesh
 from .problem import Outcome, VolumeProblem
 from .start import started
@@ -71,6 +71,8 @@ def run_optimizer(problem: VolumeProblem, optimizer: Optimizer, *, solver: str) 
     scale = (problem.solid.volume / float(volumes.sum())) ** (1.0 / 3.0)
     begun = time.perf_counter()
     found = optimizer(problem.solid, problem.x * scale, torus.scaled(scale))
+    if found is None:
+        raise ArrayError("the optimizer returned None, not an image: end it with 'return image'")
     image = as_reals(found, "what the optimizer returned", (problem.solid.n_vertices, 3))
     if not float(_core.mesh.tet_volumes(np.ascontiguousarray(image), problem.solid.T).sum()) > 0.0:
         raise OrientationError("what the optimizer returned is inside out, or has no volume")

@@ -396,11 +396,20 @@ def test_without_typer_the_pip_line_and_exit_2():
     assert "pip install 'stretchmap[cli]'" in run.stderr and run.stderr.count("\n") == 1
 
 
+def test_the_package_run_as_a_module_is_the_command(folder):
+    command = [sys.executable, "-m", "stretchmap"]
+    run = subprocess.run([*command, "--version"], capture_output=True, text=True, env=ENV)
+    assert run.returncode == 0 and run.stdout == f"stretchmap {sm.__version__}\n", run.stderr
+    run = subprocess.run([*command, "info", "nosuch.npz"], capture_output=True, text=True, env=ENV)
+    assert run.returncode == 2
+    assert run.stderr.startswith("stretchmap: error: ") and run.stderr.count("\n") == 1
+
+
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 def test_interrupting_exits_130_at_once_without_traceback(tmp_path):
     sm.write(tmp_path / "big.npz", samples.vertebra_like(120_000))
     run = subprocess.Popen(
-        [sys.executable, "-m", "stretchmap.cli", "volume", "big.npz", "-o", "map.npz"],
+        [sys.executable, "-m", "stretchmap", "volume", "big.npz", "-o", "map.npz"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -26,6 +26,7 @@ CHAIN = (
     ("population",),
     ("plot",),
     ("cli",),
+    ("__main__",),
 )
 FLOOR = {room: floor for floor, rooms in enumerate(CHAIN) for room in rooms}
 

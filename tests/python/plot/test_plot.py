@@ -267,8 +267,12 @@ def test_opposite_views_see_opposite_sides():
 
 
 def test_wrong_requests_are_refused(volume, area, tmp_path):
-    with pytest.raises(OptionError, match="kind must be 'checkerboard'"):
-        plot.picture(volume, "portrait")
+    for result in (volume, area):
+        for unknown in ("portrait", ["levels"], None):
+            with pytest.raises(OptionError, match="kind must be 'checkerboard'") as refused:
+                result.plot(unknown)
+            named = str(refused.value).split(", got")[0]
+            assert {kind for kind in plot.KINDS if repr(kind) in named} == set(plot.kinds(result))
     with pytest.raises(ArrayError, match="solid"):
         plot.cutaway(area)
     with pytest.raises(OptionError):

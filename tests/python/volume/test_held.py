@@ -143,25 +143,26 @@ def test_a_source_that_meets_itself_is_not_started_again(monkeypatch):
     assert found.certificate.reason.startswith("the source surface touches or crosses itself")
 
 
-def test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monkeypatch):
+def solved_after_holding(problem, monkeypatch):
+    """Outcome where untangling has held nine vertices, and next to no patience is left."""
+
     def untangled(run, *, glide):
         held = run.problem.solid.boundary_vertices[:9].astype(np.intp)
         run.take(dataclasses.replace(run.problem, held=held))
         return 0
 
     monkeypatch.setattr(engine, "_untangle", untangled)
-    outcome = engine.solve(
-        problem, VolumeOptions(), glide=True, budget=Budget(600.0), patience=1e-6
-    )
+    return engine.solve(problem, VolumeOptions(), glide=True, budget=Budget(600.0), patience=1e-6)
+
+
+def test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monkeypatch):
+    outcome = solved_after_holding(problem, monkeypatch)
     assert outcome.converged and not len(outcome.problem.held)
 
 
 def test_one_that_cannot_be_released_is_gone_on_with_all_the_same(problem, monkeypatch):
-    test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monkeypatch)
     monkeypatch.setattr(engine, "_release", lambda run: False)
-    outcome = engine.solve(
-        problem, VolumeOptions(), glide=True, budget=Budget(600.0), patience=1e-6
-    )
+    outcome = solved_after_holding(problem, monkeypatch)
     assert outcome.converged and len(outcome.problem.held) == 9
 
 

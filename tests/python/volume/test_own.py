@@ -86,6 +86,8 @@ def test_errors_name_what_is_wrong():
         sm.volume_map(SOLID, optimizer=3)
     with pytest.raises(ArrayError, match="what the optimizer returned"):
         sm.volume_map(SOLID, optimizer=lambda solid, image, torus: image[:-1])
+    with pytest.raises(ArrayError, match=r"returned None, not an image: end it with"):
+        sm.volume_map(SOLID, optimizer=lambda solid, image, torus: None)
     with pytest.raises(OrientationError, match="inside out"):
         sm.volume_map(SOLID, optimizer=lambda solid, image, torus: image * [1.0, 1.0, -1.0])
     for options in ({"c": 1.0}, {"max_iter": 3}, {"balance": 0.5}):
