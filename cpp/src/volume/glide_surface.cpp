@@ -9,21 +9,34 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+GlideSite GlideSurface::site(const Vector3d& x, Index hint, bool derivatives) const {
+  GlideSite site;
+  site.place = place(x, hint);
+  site.outward = outward(x, site.place);
+  if (!derivatives) return site;
+  site.frame = frame(x, site.place);
+  site.turn = outward_derivative(x, site.place);
+  return site;
+}
+
 GlideSites sites_at(const GlideSurface& surface, const PointsRef& x,
-                    const std::vector<Index>& vertices, const IndexVec& number, bool derivatives) {
+                    const std::vector<Index>& vertices, const IndexVec& number, bool derivatives,
+                    std::vector<Index>& places) {
   const Index count = static_cast<Index>(vertices.size());
+  places.resize(vertices.size(), -1);
   GlideSites sites{number, std::vector<GlideSite>(vertices.size())};
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < count; ++i) {
-    const Vector3d point = x.row(vertices[i]).transpose();
-    GlideSite& site = sites.at[i];
-    site.place = surface.place(point);
-    site.outward = surface.outward(point, site.place);
-    if (!derivatives) continue;
-    site.frame = surface.frame(point, site.place);
-    site.turn = surface.outward_derivative(point, site.place);
+    sites.at[i] = surface.site(x.row(vertices[i]).transpose(), places[i], derivatives);
+    places[i] = sites.at[i].place;
   }
   return sites;
+}
+
+GlideSites sites_at(const GlideSurface& surface, const PointsRef& x,
+                    const std::vector<Index>& vertices, const IndexVec& number, bool derivatives) {
+  std::vector<Index> places;
+  return sites_at(surface, x, vertices, number, derivatives, places);
 }
 
 namespace {
@@ -49,7 +62,7 @@ struct Turn {
 
 TorusSurface::TorusSurface(double R, double r) : torus_{R, r} {}
 
-Index TorusSurface::place(const Vector3d&) const { return -1; }
+Index TorusSurface::place(const Vector3d&, Index) const { return -1; }
 
 Matrix3d TorusSurface::frame(const Vector3d& x, Index) const {
   const Turn u(x[0], x[1]), v(x.head<2>().norm() - torus_.R, x[2]);
@@ -86,7 +99,7 @@ Vector3d TorusSurface::moved(const Vector3d& x, Index, const Vector2d& step) con
 
 // Of xi along arc length: uu is -radial / rho, vv is -normal / r, uv is -sin(v) e_u / rho, radial
 // being cos(v) normal - sin(v) e_v.
-Matrix2d TorusSurface::bending(const Vector3d& x, Index, const Vector3d& g) const {
+Matrix2d TorusSurface::bending(const Vector3d& x, const GlideSite&, const Vector3d& g) const {
   const double rho = x.head<2>().norm();
   const double cv = (rho - torus_.R) / torus_.r, sv = x[2] / torus_.r;
   Matrix2d C;

@@ -15,8 +15,9 @@ using maps::Foot;
 
 namespace {
 
-constexpr int kMostFaces = 64;     // crossed on the way to the closest point
-constexpr double kOpposed = 1e-6;  // normals at the corners of a face that cancel tell nothing
+constexpr int kMostFaces = 64;        // crossed on the way to the closest point
+constexpr double kOnSurface = 1e-24;  // squared distance over the area: nothing can be closer
+constexpr double kOpposed = 1e-6;     // normals at the corners of a face that cancel tell nothing
 
 // The rotation by the least angle that takes one direction to another turns the axes: they vary
 // smoothly with the normal everywhere but at the opposite of this direction, which is chosen to be
@@ -67,7 +68,15 @@ MeshSurface::MeshSurface(const PointsRef& points, const FacesRef& faces, MeshAxe
   face_normals_.rowwise().normalize();
 }
 
-Index MeshSurface::place(const Vector3d& x) const { return tree_.closest(x).face; }
+Index MeshSurface::place(const Vector3d& x, Index hint) const { return located(x, hint).face; }
+
+// The closest point. Of another sheet, too, unless x lies on this one.
+Foot MeshSurface::located(const Vector3d& x, Index hint) const {
+  if (hint < 0) return tree_.closest(x);
+  const Foot foot = near(x, hint);
+  if (foot.squared_distance <= kOnSurface * area_) return foot;
+  return tree_.closest(x, foot.face);
+}
 
 Foot MeshSurface::near(const Vector3d& x, Index place) const {
   Foot best = tree_.on_face(x, place);
@@ -93,20 +102,18 @@ Vector3d MeshSurface::interpolated(const Foot& foot) const {
   return normal;
 }
 
-Vector3d MeshSurface::outward(const Vector3d& x, Index place) const {
-  const Foot foot = near(x, place);
+Vector3d MeshSurface::outward_at(const Foot& foot) const {
   const Vector3d normal = interpolated(foot);
   const double length = normal.norm();
   return length > kOpposed ? normal / length : Vector3d(face_normals_.row(foot.face).transpose());
 }
 
-Matrix3d MeshSurface::frame(const Vector3d& x, Index place) const {
-  if (axes_ == MeshAxes::kSmooth) return axes_of(outward(x, place));
-  return axes_of(face_normals_.row(near(x, place).face).transpose());
+Matrix3d MeshSurface::frame_at(const Foot& foot) const {
+  if (axes_ == MeshAxes::kSmooth) return axes_of(outward_at(foot));
+  return axes_of(face_normals_.row(foot.face).transpose());
 }
 
-Matrix3d MeshSurface::outward_derivative(const Vector3d& x, Index place) const {
-  const Foot foot = near(x, place);
+Matrix3d MeshSurface::derivative_at(const Foot& foot) const {
   const Vector3d normal = interpolated(foot);
   const double length = normal.norm();
   if (!(length > kOpposed)) return Matrix3d::Zero();
@@ -124,13 +131,36 @@ Matrix3d MeshSurface::outward_derivative(const Vector3d& x, Index place) const {
   return (Matrix3d::Identity() - n * n.transpose()) / length * turn;
 }
 
+Vector3d MeshSurface::outward(const Vector3d& x, Index place) const {
+  return outward_at(near(x, place));
+}
+
+Matrix3d MeshSurface::frame(const Vector3d& x, Index place) const {
+  return frame_at(near(x, place));
+}
+
+Matrix3d MeshSurface::outward_derivative(const Vector3d& x, Index place) const {
+  return derivative_at(near(x, place));
+}
+
+GlideSite MeshSurface::site(const Vector3d& x, Index hint, bool derivatives) const {
+  const Foot foot = located(x, hint);
+  GlideSite site;
+  site.place = foot.face;
+  site.outward = outward_at(foot);
+  if (!derivatives) return site;
+  site.frame = frame_at(foot);
+  site.turn = derivative_at(foot);
+  return site;
+}
+
 Vector3d MeshSurface::moved(const Vector3d& x, Index place, const Vector2d& step) const {
   return near(x + frame(x, place).leftCols<2>() * step, place).point;
 }
 
-Matrix2d MeshSurface::bending(const Vector3d& x, Index place, const Vector3d& g) const {
-  const Eigen::Matrix<double, 3, 2> axes = frame(x, place).leftCols<2>();
-  const Matrix2d shape = axes.transpose() * outward_derivative(x, place) * axes;
+Matrix2d MeshSurface::bending(const Vector3d&, const GlideSite& site, const Vector3d& g) const {
+  const Eigen::Matrix<double, 3, 2> axes = site.frame.leftCols<2>();
+  const Matrix2d shape = axes.transpose() * site.turn * axes;
   return -0.5 * g[2] * (shape + shape.transpose());
 }
 

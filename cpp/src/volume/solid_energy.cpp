@@ -187,7 +187,7 @@ void SolidEnergy::add_face(const PointsRef& x, const GlideSites& sites, const En
 
 GlideSites SolidEnergy::sites(const PointsRef& x, bool derivatives) const {
   if (site_vertex_.empty()) return {site_number_, {}};
-  return sites_at(barrier_.surface(), x, site_vertex_, site_number_, derivatives);
+  return sites_at(barrier_.surface(), x, site_vertex_, site_number_, derivatives, site_place_);
 }
 
 // Axes of a vertex: Cartesian, or those of the surface it glides on.
@@ -212,7 +212,7 @@ void SolidEnergy::into_frames(const PointsRef& x, const GlideSites& sites, doubl
     if (motion_[other] == kGliding) turned.col(2).setZero();
     if (gliding && other == vertex) {
       const Eigen::Matrix2d C =
-          barrier_.surface().bending(x.row(vertex).transpose(), sites(vertex).place, g);
+          barrier_.surface().bending(x.row(vertex).transpose(), sites(vertex), g);
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
       eigen.computeDirect(C);
       const Eigen::Vector2d values = eigen.eigenvalues().cwiseMax(negative * eigen.eigenvalues());

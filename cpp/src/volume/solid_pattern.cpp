@@ -87,6 +87,7 @@ void SolidEnergy::number_sites() {
     site_number_[i] = static_cast<Index>(site_vertex_.size());
     site_vertex_.push_back(i);
   }
+  site_place_.assign(site_vertex_.size(), -1);
 }
 
 void SolidEnergy::build_pattern() {

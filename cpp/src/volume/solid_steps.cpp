@@ -32,7 +32,8 @@ Points SolidEnergy::move(const PointsRef& x, const PointsRef& step, double alpha
     const GlideSurface& surface = barrier_.surface();
     const Vector3d from = x.row(i).transpose();
     const Eigen::Vector2d along = alpha * step.row(row).head<2>().transpose();
-    moved.row(i) = surface.moved(from, surface.place(from), along).transpose();
+    const Index at = surface.place(from, site_place_[site_number_[i]]);
+    moved.row(i) = surface.moved(from, at, along).transpose();
   }
   return moved;
 }

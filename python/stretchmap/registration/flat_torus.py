@@ -178,13 +178,18 @@ def _least_distorted(
     return turns
 
 
-def damped_solve(gradient: NDArray[np.float64], hessian: sp.csr_matrix) -> NDArray[np.float64]:
-    """Newton step for a Hessian that is positive semi-definite only."""
+def damped_solve(
+    gradient: NDArray[np.float64], hessian: sp.csr_matrix, *, tol: float = 0.0
+) -> NDArray[np.float64]:
+    """Newton step for a Hessian that is positive semi-definite only; by a factorization, or by
+    conjugate gradients to a relative residual of ``tol``."""
     diagonal = hessian.diagonal()
     matrix = (hessian + sp.diags(1e-6 * diagonal + 1e-12 * diagonal.mean())).tocsr()
     matrix.sort_indices()
-    solver = _core.linalg.SpdSolver(matrix, "direct")
-    step, _ = solver.solve(-gradient[:, None], np.zeros((len(gradient), 1)), must_converge=False)
+    solver = _core.linalg.SpdSolver(matrix, "jacobi" if tol else "direct")
+    step, _ = solver.solve(
+        -gradient[:, None], np.zeros((len(gradient), 1)), tol=tol or 1e-10, must_converge=False
+    )
     return np.asarray(step[:, 0])
 
 

@@ -25,6 +25,7 @@ _SHORT = 0.02  # a step shorter than this asks for another kind of step
 # Surfaces have edges, where the energy has kinks and a few faces block the step of all others:
 # after the two kinds of Newton step, vertices are moved one by one.
 _KINDS = ("chord", "tangent", "one by one")
+_KIND_TOL = 5.0  # times tol: a step that gains no more asks for another kind, which may gain much
 _ROUND_TOL = 10.0  # times tol: least decrease of a round of all kinds
 
 
@@ -70,8 +71,8 @@ def match_surfaces(
     max_iter : int
         Most steps.
     tol : float
-        Another kind of step is tried when one lowers the energy by no more than this share; the
-        iteration stops when a round of all kinds lowers it by no more than ten times as much.
+        Another kind of step is tried when one lowers the energy by no more than five times this
+        share; the iteration stops when a round of all kinds lowers it by no more than ten times it.
     progress : Progress, optional
 
     Returns
@@ -122,7 +123,7 @@ def match_surfaces(
                 if taken is not None:
                     alpha, y, points, energy = taken
                     record(alpha)
-            if alpha < _SHORT or before - energy <= tol * before:
+            if alpha < _SHORT or before - energy <= _KIND_TOL * tol * before:
                 stalled += 1
                 if stalled % len(_KINDS) == 0:
                     if at_start - energy <= _ROUND_TOL * tol * at_start:

@@ -20,6 +20,7 @@ __all__ = ["SurfaceProblem"]
 
 _NO_SLOPES = np.zeros((0, 6))
 _PASSES, _LEFT = 12, 0.1  # a step leaves a face this share of its area in the flat torus
+_CG_TOL = 1e-2  # steps that are cut short by single faces need not be solved for exactly
 _SWEEPS = 2
 _REACH = 0.25  # of the mean edge at a vertex: first try of its own step
 
@@ -75,6 +76,8 @@ class SurfaceProblem:
             self.chart, y, self._homes(y), self._metric, self.rest, self._shares
         )
         gradient, hessian = gradient + cover[0], (hessian + cover[1]).tocsr()
+        if wish is None and not self.held.any():  # only to lead there, or to where landmarks go
+            return damped_solve(gradient, hessian, tol=_CG_TOL).reshape(-1, 2)
         free = np.flatnonzero(np.repeat(~self.held, 2))
         step = np.zeros(2 * len(y)) if wish is None else wish.ravel().copy()
         pull = gradient if wish is None else hessian @ step

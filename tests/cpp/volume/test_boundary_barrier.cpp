@@ -57,7 +57,7 @@ void model(const BoundaryBarrier& barrier, const Points& x, double epsilon,
   gradient.setZero();
   hessian.setZero();
   barrier.model(x, sites_at(barrier.surface(), x, {0, 1, 2}, number, true), 0, epsilon, gradient,
-                hessian);
+                &hessian);
 }
 
 }  // namespace

@@ -76,8 +76,9 @@ TEST_CASE("frames, areas and bending of a mesh approach those of the torus it is
       const auto curvatures = [](const Eigen::Matrix2d& C) {
         return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(C).eigenvalues().eval();
       };
-      bends[level] +=
-          (curvatures(mesh.bending(y, place, g)) - curvatures(torus.bending(x, -1, g))).norm();
+      bends[level] += (curvatures(mesh.bending(y, mesh.site(y, -1, true), g)) -
+                       curvatures(torus.bending(x, torus.site(x, -1, true), g)))
+                          .norm();
     }
   }
   CHECK(areas[1] < 0.3 * areas[0]);
@@ -155,7 +156,7 @@ TEST_CASE("the gradient of a face that glides on a mesh matches differences") {
       const volume::GlideSites sites = sites_at(*mesh, x, {0, 1, 2}, number, true);
       Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero(), numeric;
       Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
-      barrier.model(x, sites, 0, epsilon, gradient, hessian);
+      barrier.model(x, sites, 0, epsilon, gradient, &hessian);
       for (int k = 0; k < 6; ++k)
         numeric[k] = tests::slope(
             [&](double t) {
@@ -183,6 +184,27 @@ TEST_CASE("a point does not change to another sheet, however near that is") {
   CHECK(mesh.outward(inside, mesh.place(inside))[2] > 0.0);
   const Vector3d moved = mesh.moved(below, place, Eigen::Vector2d(0.05, 0.05));
   CHECK(moved[2] == doctest::Approx(0.0));
+}
+
+TEST_CASE("a hint spares the search, and a wrong one does not mislead") {
+  const MeshSurface mesh = torus_mesh(16);
+  for (int k = 0; k < 20; ++k) {
+    const Vector3d x = onto(mesh, on_torus(0.4 * k + 0.05, 0.9 * k + 0.03));
+    const Vector3d y = mesh.moved(x, mesh.place(x), Eigen::Vector2d(0.1, -0.2));
+    const Index there = mesh.place(y);
+    CHECK(mesh.place(y, there) == there);
+    CHECK(mesh.place(y, mesh.place(x)) == there);
+    const Vector3d across = onto(mesh, on_torus(0.4 * k + 3.0, 0.9 * k + 2.0));
+    CHECK(mesh.place(y, mesh.place(across)) == there);
+    const volume::GlideSite site = mesh.site(y, mesh.place(x), true);
+    CHECK(site.place == there);
+    CHECK(site.outward == mesh.outward(y, there));
+    CHECK(site.frame == mesh.frame(y, there));
+    CHECK(site.turn == mesh.outward_derivative(y, there));
+  }
+  const MeshSurface thin = plate(1e-3);
+  const Vector3d below(0.5, 0.4, 0.0), above(0.5, 0.4, 1e-3);
+  CHECK(thin.place(above, thin.place(below)) == thin.place(above));
 }
 
 TEST_SUITE_END();

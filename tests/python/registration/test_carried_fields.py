@@ -20,7 +20,7 @@ def coarse() -> sm.Registration:
     source, target = sm.samples.solid_torus(400), thin_wall(0.02)
     even = sm.samples.solid_torus(12_000)
     torus, skin = sm.Torus(3.0, 1.0), target.boundary_vertices
-    marks = source.boundary_vertices[::20]
+    marks = source.boundary_vertices[::22]
     u, v, _ = torus.coordinates(source.V[marks])
     goals = torus.xi(u + 0.3 * np.cos(v), v)
     nearest = [int(np.argmin(((even.V[skin] - goal) ** 2).sum(axis=1))) for goal in goals]

@@ -23,8 +23,11 @@ class MeshSurface final : public GlideSurface {
   // \pre m > 0, no face without area.
   MeshSurface(const PointsRef& points, const FacesRef& faces, MeshAxes axes = MeshAxes::kSmooth);
 
-  // \return the face closest to a point.
-  Index place(const Eigen::Vector3d& x) const override;
+  using GlideSurface::place;
+  // \return the face closest to a point; if the point lies on the surface near the face `hint`, it
+  //         is found from there.
+  Index place(const Eigen::Vector3d& x, Index hint) const override;
+  GlideSite site(const Eigen::Vector3d& x, Index hint, bool derivatives) const override;
 
   // All these look for the closest point along the surface from `place` on, as long as it comes
   // closer: another sheet of the surface is never taken, however near.
@@ -33,14 +36,18 @@ class MeshSurface final : public GlideSurface {
   Eigen::Matrix3d outward_derivative(const Eigen::Vector3d& x, Index place) const override;
   Eigen::Vector3d moved(const Eigen::Vector3d& x, Index place,
                         const Eigen::Vector2d& step) const override;
-  Eigen::Matrix2d bending(const Eigen::Vector3d& x, Index place,
+  Eigen::Matrix2d bending(const Eigen::Vector3d& x, const GlideSite& site,
                           const Eigen::Vector3d& g) const override;
   bool smooth() const override { return false; }
   double area() const override { return area_; }
 
  private:
   maps::Foot near(const Eigen::Vector3d& x, Index place) const;
+  maps::Foot located(const Eigen::Vector3d& x, Index hint) const;
   Eigen::Vector3d interpolated(const maps::Foot& foot) const;  // not of unit length
+  Eigen::Vector3d outward_at(const maps::Foot& foot) const;
+  Eigen::Matrix3d frame_at(const maps::Foot& foot) const;
+  Eigen::Matrix3d derivative_at(const maps::Foot& foot) const;
 
   maps::SurfaceTree tree_;
   Incidence<> corners_;  // at each vertex

@@ -128,14 +128,15 @@ class SolidEnergy {
   Vec weights_;
   Flags motion_;
   BoundaryBarrier barrier_;
-  std::vector<Index> site_vertex_;  // vertices that glide or are corners of gliding faces
-  IndexVec site_number_;            // (n) of each of them, -1 of all others
-  IndexVec row_vertex_;             // vertex of each row
-  IndexVec vertex_row_;             // row of each vertex, -1 if fixed
-  IndexVec row_ptr_, col_;          // block pattern
-  IndexRows slot_;                  // (k, 16) block of each pair of a tet's vertices, -1 if none
-  IndexRows face_slot_;             // (m, 9) the same of a face's vertices
-  std::vector<Index> part_row_;     // rows of part p: [part_row_[p], part_row_[p + 1])
+  std::vector<Index> site_vertex_;         // vertices that glide or are corners of gliding faces
+  IndexVec site_number_;                   // (n) of each of them, -1 of all others
+  mutable std::vector<Index> site_place_;  // of each of them when last looked for, -1 at first
+  IndexVec row_vertex_;                    // vertex of each row
+  IndexVec vertex_row_;                    // row of each vertex, -1 if fixed
+  IndexVec row_ptr_, col_;                 // block pattern
+  IndexRows slot_;               // (k, 16) block of each pair of a tet's vertices, -1 if none
+  IndexRows face_slot_;          // (m, 9) the same of a face's vertices
+  std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
   std::vector<std::vector<Index>> part_tets_;   // tets that touch them, ascending
   std::vector<std::vector<Index>> part_faces_;  // and faces
 };
