@@ -21,6 +21,12 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
+def for_legacy_vtk(array: NDArray[Any]) -> NDArray[Any]:
+    """Integers as those of 64 bits: VTK reads none of the shorter ones under the names meshio gives
+    them, and no field after them."""
+    return array.astype(np.int64) if array.dtype.kind in "biu" else array
+
+
 def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
     """Convert points to a read-only C-ordered copy.
 

@@ -10,6 +10,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import for_legacy_vtk
 from ..base.files import atomic_path
 from ..base.options import as_path
 from ..errors import FileFormatError, MissingDependencyError
@@ -80,14 +81,16 @@ def _write_by_meshio(
         raise MissingDependencyError(
             f"writing hexahedra as {path.suffix} needs meshio: pip install 'stretchmap[io]'"
         ) from None
+    file_format = _BY_MESHIO[path.suffix.lower()]
+    plain = for_legacy_vtk if file_format == "vtk" else np.asarray
     mesh = meshio.Mesh(
         V,
         [("hexahedron", H)],
-        point_data={name: np.ascontiguousarray(values) for name, values in points.items()},
-        cell_data={name: [np.ascontiguousarray(values)] for name, values in cells.items()},
+        point_data={name: np.ascontiguousarray(plain(values)) for name, values in points.items()},
+        cell_data={name: [np.ascontiguousarray(plain(values))] for name, values in cells.items()},
     )
     with atomic_path(path) as temporary:
-        mesh.write(temporary, file_format=_BY_MESHIO[path.suffix.lower()])
+        mesh.write(temporary, file_format=file_format)
 
 
 def _write_abaqus(

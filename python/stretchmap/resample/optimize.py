@@ -29,13 +29,13 @@ _RESIDUAL = 0.01  # of their linear systems
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
 _GUARD = 0.5  # hexahedra whose edge triples are all better are judged by their corners alone
-_PER_SIDE = 3  # samples of a quad, squared, its corners among them
+_PER_SIDE = 5  # samples of a quad, squared, its corners among them
 _FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
 _TOLERANCE = 0.005  # of the diagonal: larger gaps count more ...
 _NORM = 2.0  # ... with the power 2 _NORM at least, ...
-_NORM_SHARE = 2.0 / 3.0  # ... in the end with twice this share of that of the shape
+_NORM_SHARE = 4.0 / 3.0  # ... in the end with twice this share of that of the shape
 _OFFSET = 0.5  # share by which the error of the volume is made good from round to round ...
 _MOST_OFFSET = 1.0  # ... by a surface moved in or out by this many tolerances at most
 # Times the least gap so far: in needles the shape can win over the fit, and the grid swells.
