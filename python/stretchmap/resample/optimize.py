@@ -29,7 +29,8 @@ _RESIDUAL = 0.01  # of their linear systems
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
 _GUARD = 0.5  # hexahedra whose edge triples are all better are judged by their corners alone
-_PER_SIDE = 5  # samples of a quad, squared, its corners among them
+# Samples of a quad, squared, its corners among them: of few quads, which are long and warped, more.
+_PER_SIDE, _PER_SIDE_OF_MANY, _MANY_QUADS = 5, 3, 6_000
 _FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
@@ -69,9 +70,10 @@ class GridOptimizer:
         self._newton = _core.resample.HexNewton(H, len(V))
         quads = boundary_quads(H)
         self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
+        per_side = _PER_SIDE if len(quads) <= _MANY_QUADS else _PER_SIDE_OF_MANY
         self._fit = _core.resample.BoundaryFit(
             surface.V, surface.F, vertex_normals(surface),
-            *surface_sites(surface, _PER_SIDE**2 * len(quads)), quads, _PER_SIDE,
+            *surface_sites(surface, per_side**2 * len(quads)), quads, per_side,
             _FAR * self._tolerance,
         )  # fmt: skip
         self._strength = _FIT * len(quads) / surface.area
