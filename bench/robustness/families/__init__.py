@@ -59,7 +59,21 @@ class Family:
 
 def families() -> dict[str, Family]:
     """All families by name."""
-    from . import coarse, drilled, handles, knots, rings, shells, spiky, stretched, tubes
+    from . import (
+        coarse,
+        drilled,
+        handles,
+        knots,
+        pillars,
+        ribbons,
+        rings,
+        shells,
+        spiky,
+        stretched,
+        tubes,
+    )
 
-    rooms = (tubes, drilled, knots, rings, handles, spiky, coarse, stretched, shells)
+    rooms = (
+        tubes, drilled, knots, rings, handles, spiky, coarse, stretched, shells, pillars, ribbons
+    )  # fmt: skip
     return {family.name: family for room in rooms for family in room.FAMILIES}

@@ -1,6 +1,7 @@
 #include "stretchmap/volume/solid_newton.hpp"
 
 #include <cmath>
+#include <iterator>
 
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/linalg/backtrack.hpp"
@@ -13,6 +14,9 @@ using Block = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
 
 // Of the diagonal, one after the other until a step is found.
 constexpr double kShifts[] = {0.0, 1e-8, 1e-4, 1e-1, 10.0};
+// A step that single stiff elements cut shorter than that is followed by ones with the first of
+// these shifts, until they serve: it holds what is stiffest, and lets all else move.
+constexpr double kCutShort = 1e-2;
 constexpr double kRounding = 1e-12;   // a predicted decrease that is no more of the energy is none
 constexpr double kEnergyShare = 0.2;  // see SolveOptions
 constexpr int kTries = 21;            // of the line search
@@ -220,7 +224,9 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
   report.gradient_norm = gradient_.norm();
   if (report.gradient_norm == 0.0) return report;
   Points direction;
-  for (const double shift : kShifts) {
+  const std::size_t first = cut_short_ ? 1 : 0;
+  for (std::size_t k = first; k < std::size(kShifts); ++k) {
+    const double shift = kShifts[k];
     if (shift > 0.0) {
       stiffen(solver_->matrix(), shift);
       solver_->refactor();
@@ -228,12 +234,13 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
     }
     report.shift = shift;
     bool down = descend(options, poll, direction, report);
-    if (report.negative_curvature && shift == 0.0)
+    if (report.negative_curvature && k == first)
       down = solve_projected(x, w, options, poll, direction, report);
     if (!down) continue;
     if (search(x, direction, w, report)) break;
     if (report.decrement <= kRounding * std::abs(report.before.energy)) break;
   }
+  cut_short_ = report.alpha < kCutShort || (cut_short_ && report.alpha < kHeldUp);
   end_ = x;
   end_weights_ = w;
   end_report_ = report.after;

@@ -24,7 +24,9 @@ def test_there_are_the_families_asked_for(room):
     assert all(family.name == name for name, family in families().items())
 
 
-@pytest.mark.parametrize("name", ["raw_tubes", "thorny", "cut_grids"])
+@pytest.mark.parametrize(
+    "name", ["raw_tubes", "thorny", "cut_grids", "stacks", "bottles", "ribbons"]
+)
 def test_a_seed_is_a_solid_torus_and_always_the_same(name):
     from families import families
 
@@ -45,6 +47,18 @@ def test_conformal_rings_have_even_triangles():
     assert (edges.max(axis=1) / edges.min(axis=1)).max() < 3.0
     # Yet their sizes differ by far: the hole is fifty times smaller than the ring.
     assert surface.face_areas.max() > 1_000.0 * surface.face_areas.min()
+
+
+def test_ribbons_close_after_half_turns():
+    from families.ribbons import ribbon
+
+    surfaces = [ribbon(np.random.default_rng(seed), 3_000) for seed in range(12)]
+    # Closed up the wrong way, edges there would span the ribbon.
+    assert all(surface.genus == 1 and surface.volume > 0.0 for surface in surfaces)
+    for surface in surfaces:
+        corners = surface.V[surface.F]
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+        assert longest < 0.5
 
 
 def test_more_parts_than_one_hole_are_refused():

@@ -84,6 +84,7 @@ class SolidNewton {
   EnergyReport end_report_;
   std::unique_ptr<linalg::BlockSolver> solver_;
   double negative_ = 0.0;          // share of negative parts in the Hessian at hand
+  bool cut_short_ = false;         // the last step was, and the next begins with a stiffer diagonal
   int projected_ = 0;              // Hessians still to be made without negative parts
   Points gradient_;                // at the current point
   Vec last_gradient_, last_step_;  // before the last step, and the step; empty after a renewal
