@@ -12,7 +12,7 @@ using std::size_t;
 template <int B, int M>
 IterativeSolver<B, M>::IterativeSolver(Index n, const Index* start, const Index* col,
                                        std::vector<double> modes)
-    : order_(breadth_first_order(n, start, col)) {
+    : matrix_{n, start, col}, order_(breadth_first_order(n, start, col)) {
   multigrid_.finest().set_pattern(n, start, col, order_);
   constexpr size_t kWidth = static_cast<size_t>(B) * M;
   modes_.resize(modes.size());
@@ -21,24 +21,21 @@ IterativeSolver<B, M>::IterativeSolver(Index n, const Index* start, const Index*
 }
 
 template <int B, int M>
-void IterativeSolver<B, M>::set_scale(const double* values) {
+void IterativeSolver<B, M>::set_scale() {
   double largest = 0.0;
   for (Index entry : multigrid_.finest().diagonal_source)
     for (int r = 0; r < B; ++r)
-      largest = std::max(largest, values[static_cast<size_t>(B * B) * entry + (B + 1) * r]);
+      largest = std::max(largest, matrix_.value[static_cast<size_t>(B * B) * entry + (B + 1) * r]);
   scale_ = largest > 0.0 && std::isfinite(largest) ? std::ldexp(1.0, -std::ilogb(largest)) : 1.0;
 }
 
 template <int B, int M>
 std::vector<Index> IterativeSolver<B, M>::refactor(const double* values, bool keep) {
-  LevelMatrix<B>& A = multigrid_.finest();
+  matrix_.value = values;
   kept_ = keep && ready_;
-  if (kept_) {
-    A.set_product_values(values, scale_);
-    return {};
-  }
-  set_scale(values);
-  std::vector<Index> bad = A.set_values(values, scale_);
+  if (kept_) return {};
+  set_scale();
+  std::vector<Index> bad = multigrid_.finest().set_values(values, scale_);
   for (Index& row : bad) row = order_[row];
   if (!bad.empty() || modes_.empty()) return bad;
   if (ready_ && !watch_.worn()) {
@@ -53,10 +50,29 @@ std::vector<Index> IterativeSolver<B, M>::refactor(const double* values, bool ke
 
 template <int B, int M>
 template <int K>
+void IterativeSolver<B, M>::precondition(const float* r, float* z) {
+  constexpr size_t kRow = static_cast<size_t>(B) * K;
+  renumbered_r_.resize(kRow * matrix_.n);
+  renumbered_z_.resize(kRow * matrix_.n);
+  for_chunks(matrix_.n, [&](Index begin, Index end) {
+    for (size_t i = begin; i < static_cast<size_t>(end); ++i)
+      std::copy_n(r + kRow * order_[i], kRow, renumbered_r_.data() + kRow * i);
+  });
+  if (modes_.empty())
+    multigrid_.finest().template divide_by_diagonal<K>(renumbered_r_.data(), renumbered_z_.data());
+  else
+    multigrid_.template precondition<K>(renumbered_r_.data(), renumbered_z_.data());
+  for_chunks(matrix_.n, [&](Index begin, Index end) {
+    for (size_t i = begin; i < static_cast<size_t>(end); ++i)
+      std::copy_n(renumbered_z_.data() + kRow * i, kRow, z + kRow * order_[i]);
+  });
+}
+
+template <int B, int M>
+template <int K>
 PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stride, int used,
                                           const SolveOptions& options, const Poll& poll) {
-  const LevelMatrix<B>& A = multigrid_.finest();
-  const size_t n = A.n;
+  const size_t n = matrix_.n;
   // Columns scaled to moderate size, by powers of two so that nothing is rounded.
   std::array<double, K> factor;
   factor.fill(1.0);
@@ -68,31 +84,24 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
   }
   inner_b_.assign(n * B * K, 0.0);
   inner_x_.assign(n * B * K, 0.0);
+  // visit(entry of the inner vectors, of the caller's, factor) for all that are used.
   const auto each = [&](const auto& visit) {
-    for_chunks(A.n, [&](Index begin, Index end) {
-      for (size_t i = begin; i < static_cast<size_t>(end); ++i)
-        for (size_t r = 0; r < B; ++r)
-          for (int k = 0; k < used; ++k)
-            visit(K * (B * i + r) + k, stride * (B * static_cast<size_t>(order_[i]) + r) + k,
-                  factor[k]);
+    for_chunks(matrix_.n, [&](Index begin, Index end) {
+      for (size_t row = static_cast<size_t>(B) * begin; row < static_cast<size_t>(B) * end; ++row)
+        for (int k = 0; k < used; ++k) visit(K * row + k, stride * row + k, factor[k]);
     });
   };
   each([&](size_t in, size_t out, double f) {
     inner_b_[in] = f * b[out];
-    inner_x_[in] = f / scale_ * x[out];
+    inner_x_[in] = f * x[out];
   });
   const PcgSystem<K> system{
-      A.n * B, [&](const double* p, double* q) { return A.template multiply<K>(p, q); },
-      [&](const float* r, float* z) {
-        if (modes_.empty())
-          A.template divide_by_diagonal<K>(r, z);
-        else
-          multigrid_.template precondition<K>(r, z);
-      }};
+      static_cast<Index>(n) * B,
+      [&](const double* p, double* q) { return matrix_.template multiply<K>(p, q); },
+      [&](const float* r, float* z) { precondition<K>(r, z); }};
   const PcgResult<K> result =
       pcg<K>(system, inner_b_.data(), inner_x_.data(), vectors_, options, poll);
-  if (result.finite)
-    each([&](size_t in, size_t out, double f) { x[out] = scale_ / f * inner_x_[in]; });
+  if (result.finite) each([&](size_t in, size_t out, double f) { x[out] = inner_x_[in] / f; });
   if (!kept_) watch_.observe(result.iterations, result.digits);
   if (result.negative_curvature || !result.finite) watch_.fail();
   return result;

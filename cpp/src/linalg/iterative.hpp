@@ -1,9 +1,10 @@
-// Conjugate gradients on a renumbered and rescaled copy of the caller's matrix, preconditioned by
-// its diagonal blocks or by multigrid.
+// Conjugate gradients on the caller's matrix, preconditioned by the diagonal blocks or by multigrid
+// of a renumbered and rescaled copy in single precision.
 #pragma once
 
 #include <vector>
 
+#include "linalg/block_rows.hpp"
 #include "linalg/krylov/convergence_watch.hpp"
 #include "linalg/krylov/pcg.hpp"
 #include "linalg/multigrid/multigrid.hpp"
@@ -17,8 +18,8 @@ inline int padded_columns(Index k) { return k >= 3 ? 4 : static_cast<int>(k); }
 template <int B, int M>
 class IterativeSolver {
  public:
-  // Pattern in compressed rows, with the diagonal. modes (n B M), row-major; empty: the diagonal
-  // blocks alone precondition.
+  // Pattern in compressed rows, with the diagonal; it has to outlive this, like the values below.
+  // modes (n B M), row-major; empty: the diagonal blocks alone precondition.
   IterativeSolver(Index n, const Index* start, const Index* col, std::vector<double> modes);
 
   // Values in the pattern's order, row-major blocks. keep: the preconditioner stays as it is.
@@ -31,7 +32,10 @@ class IterativeSolver {
                      const SolveOptions& options, const Poll& poll);
 
  private:
-  void set_scale(const double* values);
+  void set_scale();
+  template <int K>
+  void precondition(const float* r, float* z);
+  BlockRows<B> matrix_;
   std::vector<Index> order_;  // order_[new] = old, block rows
   std::vector<double> modes_;
   Multigrid<B, M> multigrid_;  // with the diagonal alone only its finest level is used
@@ -40,8 +44,9 @@ class IterativeSolver {
   bool kept_ =
       false;  // the hierarchy belongs to earlier values: how it does says nothing of its age
   std::vector<double> inner_b_, inner_x_;  // kept, like the vectors, for the next solve
+  std::vector<float> renumbered_r_, renumbered_z_;
   PcgVectors vectors_;
-  double scale_ = 1.0;  // power of two that brings the diagonal near one
+  double scale_ = 1.0;  // power of two that brings the diagonal near one for single precision
 };
 
 }  // namespace stretchmap::linalg

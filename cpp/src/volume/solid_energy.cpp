@@ -112,27 +112,31 @@ EnergyReport SolidEnergy::summed(const Energies& found) {
 void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
                               Points& gradient, double* blocks) const {
   std::array<Index, 4> row;
+  std::array<bool, 4> mine;
   for (int a = 0; a < 4; ++a) {
     row[a] = vertex_row_[tets_(t, a)];
-    if (row[a] < first || row[a] >= last) row[a] = -1;
+    mine[a] = row[a] >= first && row[a] < last;
   }
   RowVector3d others = RowVector3d::Zero();
   for (int a = 0; a < 3; ++a) {
     const RowVector3d g(batch.gradient[3 * a][lane], batch.gradient[3 * a + 1][lane],
                         batch.gradient[3 * a + 2][lane]);
     others += g;
-    if (row[a + 1] >= 0) gradient.row(row[a + 1]) += g;
+    if (mine[a + 1]) gradient.row(row[a + 1]) += g;
   }
-  if (row[0] >= 0) gradient.row(row[0]) -= others;
+  if (mine[0]) gradient.row(row[0]) -= others;
   if (!blocks) return;
 
   Block3 H[4][4];
   tet_blocks(batch, lane, 1.0, H);
   for (int a = 0; a < 4; ++a) {
-    if (row[a] < 0) continue;
-    for (int b = 0; b < 4; ++b)
-      if (const Index slot = slot_(t, 4 * a + b); slot >= 0)
-        add_block(H[a][b], blocks + 9 * static_cast<std::ptrdiff_t>(slot));
+    if (!mine[a]) continue;
+    for (int b = 0; b < 4; ++b) {
+      if (row[b] < 0) continue;
+      const std::uint16_t place = place_(t, 4 * a + b);
+      const Index slot = place < kFar ? row_ptr_[row[a]] + place : find_block(row[a], row[b]);
+      add_block(H[a][b], blocks + 9 * static_cast<std::ptrdiff_t>(slot));
+    }
   }
 }
 

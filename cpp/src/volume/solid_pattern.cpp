@@ -109,14 +109,15 @@ void SolidEnergy::build_pattern() {
   row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n_rows + 1);
   col_ = Eigen::Map<const IndexVec>(pattern.col.data(), static_cast<Index>(pattern.col.size()));
 
-  slot_.setConstant(k, 16, -1);
+  place_.setZero(k, 16);
   for_chunks_with(
       n_rows, [&] { return std::vector<Index>(n_rows); },
       [&](Index begin, Index end, std::vector<Index>& place) {
         for (Index row = begin; row < end; ++row) {
-          for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p) place[col_[p]] = p;
+          for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p)
+            place[col_[p]] = std::min<Index>(p - row_ptr_[row], kFar);
           for_corners(row, [&](Index at, int b, Index other) {
-            slot_(at / 4, 4 * (at % 4) + b) = place[other];
+            place_(at / 4, 4 * (at % 4) + b) = static_cast<std::uint16_t>(place[other]);
           });
         }
       });

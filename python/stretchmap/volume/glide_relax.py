@@ -134,7 +134,7 @@ class Relaxation:
             newton = _core.volume.SolidNewton(
                 at,
                 tets=np.ascontiguousarray(number[model.T[patch.tets]]),
-                rest=np.ascontiguousarray(model.rest[patch.tets]),
+                rest=model.rest(patch.tets),
                 weights=np.ascontiguousarray(model.weights[patch.tets]),
                 motion=patch.motion.astype(np.uint8),
                 boundary=axes.gliding(faces, number) if len(faces) else None,

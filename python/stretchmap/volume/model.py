@@ -90,10 +90,9 @@ class SolidModel:
         """Source volumes round the vertices, a share of the whole each: (n,)."""
         return _core.measures.ring_sums(self.T, self.shares, len(self.V))
 
-    @cached_property
-    def rest(self) -> NDArray[np.float64]:
-        """Rest matrices (k, 9)."""
-        return _core.volume.rest_matrices(self.V, self.T, self.options.max_aspect)
+    def rest(self, tets: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.float64]:
+        """Rest matrices (k, 9), of some tets or all; not kept, as the minimizer has its own."""
+        return _core.volume.rest_matrices(self.V, self.T[tets], self.options.max_aspect)
 
     @cached_property
     def local_volumes(self) -> NDArray[np.float64]:
@@ -221,7 +220,7 @@ class SolidModel:
         return _core.volume.SolidNewton(
             x,
             tets=self.T,
-            rest=self.rest,
+            rest=self.rest(),
             weights=self.weights if weights is None else weights,
             motion=self.motion(glide=glide),
             boundary=self.gliding(self.faces[self.gliding_faces]) if glide else None,

@@ -279,7 +279,7 @@ def untangle_patches(
         newton = _core.volume.SolidNewton(
             start,
             tets=np.ascontiguousarray(number[model.T[patch.tets]]),
-            rest=np.ascontiguousarray(model.rest[patch.tets]),
+            rest=model.rest(patch.tets),
             weights=weights / weights.sum(),
             motion=patch.motion.astype(np.uint8),
             boundary=boundary,

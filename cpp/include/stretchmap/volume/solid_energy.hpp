@@ -11,6 +11,7 @@
 // of threads. Rows are numbered along a space-filling curve.
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -121,6 +122,7 @@ class SolidEnergy {
   void into_frames(const PointsRef& x, const GlideSites& sites, double negative, Index row,
                    Points& gradient, double* blocks) const;
 
+  static constexpr std::uint16_t kFar = 0xFFFF;
   Tets tets_;       // sorted by lowest row
   IndexVec order_;  // which of the tets given each of them is
   Vec target_;      // (k) in the sorted order; empty: ones
@@ -134,8 +136,9 @@ class SolidEnergy {
   IndexVec row_vertex_;                    // vertex of each row
   IndexVec vertex_row_;                    // row of each vertex, -1 if fixed
   IndexVec row_ptr_, col_;                 // block pattern
-  IndexRows slot_;               // (k, 16) block of each pair of a tet's vertices, -1 if none
-  IndexRows face_slot_;          // (m, 9) the same of a face's vertices
+  // (k, 16) position within the row of each pair of a tet's vertices, kFar if it is beyond reach.
+  Eigen::Matrix<std::uint16_t, Eigen::Dynamic, 16, Eigen::RowMajor> place_;
+  IndexRows face_slot_;          // (m, 9) block of each pair of a face's vertices, -1 if none
   std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
   std::vector<std::vector<Index>> part_tets_;   // tets that touch them, ascending
   std::vector<std::vector<Index>> part_faces_;  // and faces

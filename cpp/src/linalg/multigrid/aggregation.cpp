@@ -7,12 +7,10 @@ namespace {
 
 template <int B>
 double coupling(const LevelMatrix<B>& A, Index e) {
-  if constexpr (B == 1) return -A.value[e];
+  const auto block = A.block(e);
+  if constexpr (B == 1) return -block[0];
   double sum = 0.0;
-  for (int k = 0; k < B * B; ++k) {
-    const double a = A.value[static_cast<std::size_t>(B * B) * e + k];
-    sum += a * a;
-  }
+  for (const double a : block) sum += a * a;
   return std::sqrt(sum);
 }
 

@@ -1,4 +1,4 @@
-// The matrix of one level: products in double precision, smoothing in single precision.
+// The matrix of one level, as smoothing needs it: in single precision.
 //
 // Smoothing is a Gauss-Seidel sweep inside each of a fixed number of row chunks, all chunks at once
 // (so the result does not depend on the number of threads). To let the sweeps run without a branch
@@ -8,6 +8,7 @@
 // delivers. Blocks are B x B.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -31,7 +32,9 @@ struct LevelMatrix {
   // [upper[i], start[i + 1]) later columns.
   std::vector<Index> start, lower, upper, col;
   std::vector<Index> source, diagonal_source;  // where the values come from, see set_values
-  std::vector<double> value, diagonal;         // row-major blocks
+  const double* values = nullptr;              // those, and what they are multiplied by
+  double scale = 1.0;
+  std::vector<double> diagonal;  // row-major blocks, multiplied
   // Earlier columns of the same chunk; all others, the later ones of row i from later[i] on.
   SweepEntries earlier, rest;
   std::vector<Index> later;
@@ -44,16 +47,19 @@ struct LevelMatrix {
   // and columns; empty: as it is.
   void set_pattern(Index rows, const Index* row_start, const Index* columns,
                    const std::vector<Index>& order);
-  // Values of the pattern's entries in its own order, row-major blocks, times `scale`. Returns the
-  // rows (at most 20) whose diagonal block is not positive definite; such a block is replaced by
-  // one with the absolute values of its eigenvalues.
-  std::vector<Index> set_values(const double* values, double scale = 1.0);
-  // The same for the products only: smoothing goes on with the values it has.
-  void set_product_values(const double* values, double scale);
+  // From now on with the `given` values of the pattern's entries in its own order, row-major
+  // blocks, which have to outlive this, times `factor`. Returns the rows (at most 20) whose
+  // diagonal block is not positive definite; such a block is replaced by one with the absolute
+  // values of its eigenvalues.
+  std::vector<Index> set_values(const double* given, double factor = 1.0);
+  // The block of entry e, row-major.
+  std::array<double, B * B> block(Index e) const {
+    std::array<double, B * B> out;
+    const double* from = values + static_cast<std::size_t>(B * B) * source[e];
+    for (int k = 0; k < B * B; ++k) out[k] = scale * from[k];
+    return out;
+  }
 
-  // y = A x, K columns; returns x'y of each column.
-  template <int K>
-  std::array<double, K> multiply(const double* x, double* y) const;
   // z = D^-1 r, K columns.
   template <int K>
   void divide_by_diagonal(const float* r, float* z) const;
@@ -63,7 +69,7 @@ struct LevelMatrix {
   // x = y + M' (b - A y), one backward sweep.
   template <int K>
   void sweep_backward(const float* b, const float* y, float* x) const;
-  // y = D^-1 A x with the single-precision values, one column.
+  // y = D^-1 A x, one column.
   void scaled_multiply(const float* x, float* y) const;
 
  private:

@@ -1,5 +1,6 @@
 #include "linalg/multigrid/transfer.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -9,6 +10,8 @@ namespace stretchmap::linalg {
 namespace {
 
 using std::size_t;
+
+constexpr Index kParts = 10;  // of A P: all of it would be the largest array there is
 
 // The transpose of a pattern and, for each of its entries, the entry it came from.
 std::pair<Pattern, std::vector<Index>> transpose(const Pattern& p) {
@@ -152,13 +155,12 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
       double lumped = 0.0;
       for (Index e = A.start[i]; e < A.start[i + 1]; ++e) {
         const Index j = A.col[e];
-        const double* a = A.value.data() + static_cast<size_t>(B * B) * e;
         if (!aggregates.strong[e]) {
-          if constexpr (B == 1) lumped += a[0];
+          if constexpr (B == 1) lumped += A.block(e)[0];
           continue;
         }
         if (of[j] < 0) continue;
-        multiply_add<B, B, K, false>(a, tentative.data() + kSize * j,
+        multiply_add<B, B, K, false>(A.block(e).data(), tentative.data() + kSize * j,
                                      sum.data() + kSize * slot[of[j]]);
       }
       // P = T - damping (T + D^-1 sum)
@@ -186,66 +188,92 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
   });
 }
 
+// to[f] += a p[j, f] for the entries f of row j of P.
 template <int B, int K>
-std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) {
-  constexpr size_t kSize = static_cast<size_t>(B) * K, kCoarse = static_cast<size_t>(K) * K;
-  const auto make_slots = [&] { return std::vector<Index>(aggregates.count); };
-  product_.resize(kSize * ap.col.size() + 1);  // see add_block_products
-  for_chunks_with(A.n, make_slots, [&](Index begin, Index end, std::vector<Index>& slot) {
-    for (Index i = begin; i < end; ++i) {
-      for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e) slot[ap.col[e]] = e;
-      std::fill(product_.begin() + kSize * ap.start[i], product_.begin() + kSize * ap.start[i + 1],
-                0.0);
-      const auto add = [&](const double* a, Index j) {
-        if constexpr (B == 3 && K == 3) {
-          const size_t first = p.start[j];
-          add_block_products(a, p_value.data() + kSize * first, p.col.data() + first,
-                             p.start[j + 1] - p.start[j], slot.data(), product_.data());
-          return;
-        }
-        for (Index e = p.start[j]; e < p.start[j + 1]; ++e) {
-          multiply_add<B, B, K, false>(a, p_value.data() + kSize * e,
-                                       product_.data() + kSize * slot[p.col[e]]);
-        }
-      };
-      add(A.diagonal.data() + static_cast<size_t>(B * B) * i, i);
-      for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
-        add(A.value.data() + static_cast<size_t>(B * B) * e, A.col[e]);
-    }
-  });
-  std::vector<double> values(kCoarse * coarse.col.size(), 0.0);
+void add_row(const double* a, const Transfer<B, K>& t, Index j, const Index* slot, double* to) {
+  const size_t first = t.p.start[j], last = t.p.start[j + 1];
+  const float* row = t.p_value.data() + static_cast<size_t>(B * K) * first;
+  if constexpr (B == 3 && K == 3) {
+    add_block_products(a, row, t.p.col.data() + first, static_cast<Index>(last - first), slot, to);
+  } else {
+    for (size_t e = first; e < last; ++e, row += B * K)
+      multiply_add<B, B, K, false>(a, row, to + static_cast<size_t>(B * K) * slot[t.p.col[e]]);
+  }
+}
+
+// Rows [first, last) of A P.
+template <int B, int K>
+void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index last,
+                                   std::vector<double>& product) const {
+  constexpr size_t kSize = static_cast<size_t>(B) * K;
+  product.assign(kSize * (ap.start[last] - ap.start[first]) + 1, 0.0);  // see add_block_products
   for_chunks_with(
-      coarse.rows(), make_slots,
+      last - first, [&] { return std::vector<Index>(aggregates.count); },
       [&](Index begin, Index end, std::vector<Index>& slot) {
-        for (Index a = begin; a < end; ++a) {
-          for (Index e = coarse.start[a]; e < coarse.start[a + 1]; ++e) slot[coarse.col[e]] = e;
-          for (Index e = r.start[a]; e < r.start[a + 1]; ++e) {
-            const Index i = r.col[e];
-            const float* left = r_value.data() + kSize * e;
-            if constexpr (B == 3 && K == 3) {
-              const size_t first = ap.start[i];
-              double transposed[9];
-              for (int k = 0; k < 9; ++k) transposed[k] = left[3 * (k % 3) + k / 3];
-              add_block_products(transposed, product_.data() + kSize * first, ap.col.data() + first,
-                                 ap.start[i + 1] - ap.start[i], slot.data(), values.data());
-              continue;
-            }
-            for (Index f = ap.start[i]; f < ap.start[i + 1]; ++f) {
-              multiply_add<K, B, K, true>(left, product_.data() + kSize * f,
-                                          values.data() + kCoarse * slot[ap.col[f]]);
-            }
-          }
-          // A mode the aggregate cannot represent: an equation of its own keeps the matrix regular.
-          double* block = values.data() + kCoarse * slot[a];
-          double largest = 0.0;
-          for (int k = 0; k < K; ++k) largest = std::max(largest, block[(K + 1) * k]);
-          for (int k = 0; k < K; ++k)
-            if (block[(K + 1) * k] == 0.0 && K > 1)
-              block[(K + 1) * k] = largest > 0.0 ? largest : 1.0;
+        for (Index i = first + begin; i < first + end; ++i) {
+          for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e)
+            slot[ap.col[e]] = e - ap.start[first];
+          add_row(A.diagonal.data() + static_cast<size_t>(B * B) * i, *this, i, slot.data(),
+                  product.data());
+          for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
+            add_row(A.block(e).data(), *this, A.col[e], slot.data(), product.data());
         }
       },
-      kChunk / 16);
+      kChunk / 8);
+}
+
+template <int B, int K>
+std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const {
+  constexpr size_t kSize = static_cast<size_t>(B) * K, kCoarse = static_cast<size_t>(K) * K;
+  std::vector<double> values(kCoarse * coarse.col.size(), 0.0), product;
+  std::vector<Index> next(r.start.begin(), r.start.end() - 1);  // first entry of r not yet added
+  const Index at_once = std::max(kChunk, A.n / kParts + 1);
+  for (Index first = 0; first < A.n; first += at_once) {
+    const Index last = std::min(A.n, first + at_once);
+    multiply_rows(A, first, last, product);
+    for_chunks_with(
+        coarse.rows(), [&] { return std::vector<Index>(aggregates.count); },
+        [&](Index begin, Index end, std::vector<Index>& slot) {
+          for (Index a = begin; a < end; ++a) {
+            Index& e = next[a];
+            const auto there = [&] { return e < r.start[a + 1] && r.col[e] < last; };
+            if (!there()) continue;
+            for (Index c = coarse.start[a]; c < coarse.start[a + 1]; ++c) slot[coarse.col[c]] = c;
+            for (; there(); ++e) {
+              const Index i = r.col[e];
+              const float* left = r_value.data() + kSize * e;
+              const double* right = product.data() + kSize * (ap.start[i] - ap.start[first]);
+              if constexpr (B == 3 && K == 3) {
+                double transposed[9];
+                for (int k = 0; k < 9; ++k) transposed[k] = left[3 * (k % 3) + k / 3];
+                add_block_products(transposed, right, ap.col.data() + ap.start[i],
+                                   ap.start[i + 1] - ap.start[i], slot.data(), values.data());
+                continue;
+              }
+              for (Index f = ap.start[i]; f < ap.start[i + 1]; ++f, right += kSize)
+                multiply_add<K, B, K, true>(left, right, values.data() + kCoarse * slot[ap.col[f]]);
+            }
+          }
+        },
+        kChunk / 16);
+  }
+  keep_regular(values);
   return values;
+}
+
+// A mode that an aggregate cannot represent: an equation of its own keeps the matrix regular.
+template <int B, int K>
+void Transfer<B, K>::keep_regular(std::vector<double>& values) const {
+  for (Index a = 0; K > 1 && a < coarse.rows(); ++a) {
+    const Index* columns = coarse.col.data();
+    const Index at = static_cast<Index>(
+        std::lower_bound(columns + coarse.start[a], columns + coarse.start[a + 1], a) - columns);
+    double* block = values.data() + static_cast<size_t>(K * K) * at;
+    double largest = 0.0;
+    for (int k = 0; k < K; ++k) largest = std::max(largest, block[(K + 1) * k]);
+    for (int k = 0; k < K; ++k)
+      if (block[(K + 1) * k] == 0.0) block[(K + 1) * k] = largest > 0.0 ? largest : 1.0;
+  }
 }
 
 // Several columns (N > 1) come with single unknowns only.

@@ -24,7 +24,7 @@ struct Transfer {
   // P = (I - damping D^-1 A) T, weak scalar entries of A being added to its diagonal.
   void set_values(const LevelMatrix<B>& A);
   // Values of P'AP in the order of `coarse`, row-major K x K blocks.
-  std::vector<double> coarse_values(const LevelMatrix<B>& A);
+  std::vector<double> coarse_values(const LevelMatrix<B>& A) const;
 
   // b = P' r, N columns.
   template <int N>
@@ -36,8 +36,9 @@ struct Transfer {
  private:
   std::vector<double> orthonormal(Index n, const std::vector<double>& modes);
   void set_patterns(const LevelMatrix<B>& A);
-
-  std::vector<double> product_;  // A P, kept for its memory
+  void multiply_rows(const LevelMatrix<B>& A, Index first, Index last,
+                     std::vector<double>& product) const;
+  void keep_regular(std::vector<double>& values) const;
 };
 
 }  // namespace stretchmap::linalg
