@@ -7,6 +7,8 @@ target_include_directories(stretchmap_tests PRIVATE tests/cpp bench/cpp cpp/src)
 target_link_libraries(stretchmap_tests PRIVATE stretchmap_core doctest::doctest)
 target_precompile_headers(stretchmap_tests PRIVATE <doctest/doctest.h>
                                                    <stretchmap/base/types.hpp>)
+# What asks for the implementation has to be the first to read the header.
+set_source_files_properties(tests/cpp/main.cpp PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 include(doctest)
 doctest_discover_tests(stretchmap_tests TEST_PREFIX "cpp: " PROPERTIES LABELS cpp)
 

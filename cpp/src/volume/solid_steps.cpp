@@ -75,12 +75,14 @@ Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
 EasedStep SolidEnergy::eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w,
                              double most, double enough) const {
   EasedStep best;
-  const Energies before = energies(x, w);
+  Energies before = energies(x, w);
+  const double goal = summed(before).energy - enough;
+  before.det.resize(0);
   Points shortened = step;
   Energies after = energies(move(x, shortened, 1.0), w);
-  const double goal = summed(before).energy - enough;
   for (int pass = 0; pass < kEasingPasses && shorten(before, after, most, shortened); ++pass) {
     Points image = move(x, shortened, 1.0);
+    after = {};  // before there are others
     after = energies(image, w);
     const EnergyReport there = summed(after);
     if (!(there.energy < best.there.energy)) continue;
