@@ -50,6 +50,7 @@ class _Run:
     options: FillOptions
     history: History  # with the share of time that untangling may take, at first
     budget: Budget  # all of it
+    on_mesh: bool = False  # whether the boundary is going to glide on one
     seconds: dict[str, float] = field(default_factory=dict)
 
     def take(self, problem: VolumeProblem) -> None:
@@ -100,15 +101,13 @@ def solve(
     clock = time.perf_counter()
     problem = started(problem, solver=options.solver)
     history = History(problem.model(options), budget.share(patience), progress)
-    run = _Run(problem, options, history, budget)
-    run.seconds["start"] = time.perf_counter() - clock
     on_mesh = glide and problem.ground is not None
+    run = _Run(problem, options, history, budget, on_mesh)
+    run.seconds["start"] = time.perf_counter() - clock
     with run.timed("untangle"):
         left = _untangle(run, glide=glide and not on_mesh)
-        if left and run.problem.ground is not None:
-            freed = untangle_on_mesh(run.problem, options, run.history)
-            if freed is not None:
-                run.x, left = freed, 0
+        if left and _freed(run):
+            left = 0
     if left:
         reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")
@@ -147,6 +146,16 @@ def _keep(run: _Run, x: NDArray[np.float64], glide: bool, otherwise: str) -> boo
         return False
     run.x = x
     return True
+
+
+def _freed(run: _Run) -> bool:
+    """Whether the boundary, giving way on its mesh, lets go what nothing inside untangles."""
+    if run.problem.ground is None:
+        return False
+    freed = untangle_on_mesh(run.problem, run.options, run.history)
+    if freed is not None:
+        run.x = freed
+    return freed is not None
 
 
 def _untangle(run: _Run, *, glide: bool) -> int:
@@ -194,12 +203,17 @@ def _inverted(run: _Run) -> int:
 
 
 def _untangle_inside(run: _Run) -> NDArray[np.intp]:
-    """All tets, then patches, and where that does not do, both more thoroughly; tets left."""
+    """All tets, then patches, and where that does not do, both more thoroughly; tets left.
+
+    A boundary that is going to glide on a mesh gives way before that.
+    """
     history = run.history
     run.x = untangle_whole(history.model, run.x, history, glide=False).x
     stuck = _patched(run, glide=False)
     if not len(stuck):
         return stuck
+    if run.on_mesh and _freed(run):
+        return stuck[:0]
     before = run.problem
     run.x = untangle_whole(history.model, run.x, history, glide=False, thorough=True).x
     left = _patched(run, glide=False)

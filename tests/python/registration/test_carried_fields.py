@@ -24,7 +24,7 @@ def coarse() -> sm.Registration:
     u, v, _ = torus.coordinates(source.V[marks])
     goals = torus.xi(u + 0.3 * np.cos(v), v)
     nearest = [int(np.argmin(((even.V[skin] - goal) ** 2).sum(axis=1))) for goal in goals]
-    result = sm.register(source, target, (marks, skin[nearest]))
+    result = sm.register(source, target, (marks, skin[nearest]), boundary="frozen")
     assert result.boundary_splits > 0 and result.refinement is not None
     assert result.refinement.n_split > result.boundary_splits
     return result

@@ -128,7 +128,7 @@ def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
     assert ground.glide_on_mesh(problem, options, history) is None
 
 
-def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps):
+def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps, monkeypatch):
     """A boundary vertex is drawn past its neighbor: what lies below cannot be untangled."""
     held, surface = maps["frozen"], maps["frozen"].mesh.surface
     ids, image = held.mesh.boundary_vertices, held.image.copy()
@@ -155,6 +155,18 @@ def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps):
     assert moved[ids[vertex]] and moved.mean() < 0.5
     still = dataclasses.replace(problem, pinned=ids.astype(np.intp))
     assert ground.untangle_on_mesh(still, options, history) is None
+
+    # Where the boundary is going to glide, that comes before anything thorough.
+    thorough, whole = [], engine.untangle_whole
+
+    def counted(*given, **more):
+        thorough.append(more.get("thorough", False))
+        return whole(*given, **more)
+
+    monkeypatch.setattr(engine, "untangle_whole", counted)
+    outcome = engine.solve(problem, options, glide=True)
+    assert sm.certify(held.mesh, outcome.problem.x).certified
+    assert thorough and not any(thorough)
 
 
 def test_targets_ask_for_what_is_missing_and_no_more(pair, maps):
