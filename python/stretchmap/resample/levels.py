@@ -31,9 +31,6 @@ _MANY = 100_000  # are finished with few steps, between two splits, too
 # Of grids as close to the surface as this share of the diagonal, or none of them, but all within
 # this factor of the closest, the shape decides.
 _CLOSE, _ALIKE = 0.005, 1.25
-# Which choice ends closest its first rounds do not tell: two are gone on with, and the others as
-# long as none is that close, but within this factor.
-_KEPT, _REACH = 2, 2.0
 # Of a grid that was split in eight: smaller quads fit better.
 _FINER = Schedule(
     fit=3.0,
@@ -167,11 +164,7 @@ def _best_optimized(starts: list[Start], solid: TetMesh, progress: Progress | No
     ended: list[tuple[float, float, Start]] = []
     failure = None
     diagonal = float(np.linalg.norm(np.ptp(solid.V, axis=0)))
-    closest = np.inf
-    for done, start in enumerate(starts):
-        within_reach = _CLOSE < closest <= _REACH * _CLOSE
-        if done >= _KEPT and ended and not within_reach:
-            break
+    for start in starts:
         H = start.layout.H
         try:
             V = optimized(start.V, H, solid, Schedule(), progress)
@@ -181,8 +174,8 @@ def _best_optimized(starts: list[Start], solid: TetMesh, progress: Progress | No
         away = max(boundary_distances(V, boundary_quads(H), solid.surface)) / diagonal
         least = float(_core.resample.scaled_jacobians(V, H).min())
         ended.append((away, least, replace(start, V=V)))
-        closest = min(closest, away)
     if failure is not None and not ended:
         raise failure
+    closest = min(away for away, _, _ in ended)
     limit = _CLOSE if closest <= _CLOSE else _ALIKE * closest
     return max((end for end in ended if end[0] <= limit), key=lambda end: end[1])[2]

@@ -29,14 +29,13 @@ _RESIDUAL = 0.01  # of their linear systems
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
 _GUARD = 0.5  # hexahedra whose edge triples are all better are judged by their corners alone
-# Samples of a quad, squared, its corners among them: of few quads, which are long and warped, more.
-_PER_SIDE, _PER_SIDE_OF_MANY, _MANY_QUADS = 5, 3, 6_000
+_PER_SIDE = 3  # samples of a quad, squared, its corners among them
 _FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
 _TOLERANCE = 0.005  # of the diagonal: larger gaps count more ...
 _NORM = 2.0  # ... with the power 2 _NORM at least, ...
-_NORM_SHARE = 4.0 / 3.0  # ... in the end with twice this share of that of the shape
+_NORM_SHARE = 2.0 / 3.0  # ... in the end with twice this share of that of the shape
 _OFFSET = 0.5  # share by which the error of the volume is made good from round to round ...
 _MOST_OFFSET = 1.0  # ... by a surface moved in or out by this many tolerances at most
 # Times the least gap so far: in needles the shape can win over the fit, and the grid swells.
@@ -70,10 +69,9 @@ class GridOptimizer:
         self._newton = _core.resample.HexNewton(H, len(V))
         quads = boundary_quads(H)
         self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
-        per_side = _PER_SIDE if len(quads) <= _MANY_QUADS else _PER_SIDE_OF_MANY
         self._fit = _core.resample.BoundaryFit(
             surface.V, surface.F, vertex_normals(surface),
-            *surface_sites(surface, per_side**2 * len(quads)), quads, per_side,
+            *surface_sites(surface, _PER_SIDE**2 * len(quads)), quads, _PER_SIDE,
             _FAR * self._tolerance,
         )  # fmt: skip
         self._strength = _FIT * len(quads) / surface.area

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["TRIAL", "Start", "best_starts", "equal_axes", "pulled_back"]
 
 _BISECTIONS = 40
+_KEPT = 2  # after the first rounds: which of them ends closer is not known yet
 TRIAL = Schedule(even=tuple(np.geomspace(0.003, 1.0, 16)), powers=(1.0,) * 2 + (2.0,) * 2)
 
 
@@ -59,7 +60,7 @@ def best_starts(
     candidates: Sequence[Sequence[int]] | NDArray[np.int_],
     progress: Progress | None = None,
 ) -> list[Start]:
-    """Grids after the first rounds, those whose boundaries are the closest to the surface first.
+    """The two grids whose boundaries are the closest to the surface after the first rounds.
 
     Where none is valid after them, or all have lost the surface, the closest as it was pulled back.
 
@@ -89,7 +90,7 @@ def best_starts(
     if not sound and not lost:
         raise SolverError(f"no grid could be begun with: {failure}") from failure
     ranked = sorted(sound or lost, key=lambda pair: pair[0])
-    return [start for _, start in (ranked if sound else ranked[:1])]
+    return [start for _, start in ranked[: _KEPT if sound else 1]]
 
 
 def equal_axes(points: NDArray[np.float64]) -> NDArray[np.float64]:
