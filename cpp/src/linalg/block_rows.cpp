@@ -64,6 +64,7 @@ std::array<double, K> BlockRows<B>::multiply(const double* x, double* y) const {
       if constexpr (K > 1) {
         Lanes<double, K> total = Lanes<double, K>::Zero();
         for (size_t e = first; e < last; ++e) total += value[e] * lanes<K>(x + K * col[e]);
+        total *= scale;
         Eigen::Map<Lanes<double, K>>(y + K * i) = total;
         total *= lanes<K>(x + K * i);
         for (int k = 0; k < K; ++k) dots[k] += total[k];
@@ -72,7 +73,10 @@ std::array<double, K> BlockRows<B>::multiply(const double* x, double* y) const {
         for (size_t e = first; e < last; ++e)
           sum.add(value + kBlock * e, x + B * static_cast<size_t>(col[e]));
         sum.store(y + B * i);
-        for (int r = 0; r < B; ++r) dots[0] += x[B * i + r] * y[B * i + r];
+        for (int r = 0; r < B; ++r) {
+          y[B * i + r] *= scale;
+          dots[0] += x[B * i + r] * y[B * i + r];
+        }
       }
     }
   });

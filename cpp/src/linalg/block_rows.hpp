@@ -12,6 +12,7 @@ struct BlockRows {
   Index n = 0;  // block rows
   const Index *start = nullptr, *col = nullptr;
   const double* value = nullptr;  // row-major blocks
+  double scale = 1.0;             // all are multiplied by
 
   // y = A x, K interleaved columns; returns x'y of each column.
   template <int K>

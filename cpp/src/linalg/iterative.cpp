@@ -26,7 +26,8 @@ void IterativeSolver<B, M>::set_scale() {
   for (Index entry : multigrid_.finest().diagonal_source)
     for (int r = 0; r < B; ++r)
       largest = std::max(largest, matrix_.value[static_cast<size_t>(B * B) * entry + (B + 1) * r]);
-  scale_ = largest > 0.0 && std::isfinite(largest) ? std::ldexp(1.0, -std::ilogb(largest)) : 1.0;
+  const bool usable = largest > 0.0 && std::isfinite(largest);
+  matrix_.scale = usable ? std::ldexp(1.0, -std::ilogb(largest)) : 1.0;
 }
 
 template <int B, int M>
@@ -35,7 +36,7 @@ std::vector<Index> IterativeSolver<B, M>::refactor(const double* values, bool ke
   kept_ = keep && ready_;
   if (kept_) return {};
   set_scale();
-  std::vector<Index> bad = multigrid_.finest().set_values(values, scale_);
+  std::vector<Index> bad = multigrid_.finest().set_values(values, matrix_.scale);
   for (Index& row : bad) row = order_[row];
   if (!bad.empty() || modes_.empty()) return bad;
   if (ready_ && !watch_.worn()) {
@@ -93,7 +94,7 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
   };
   each([&](size_t in, size_t out, double f) {
     inner_b_[in] = f * b[out];
-    inner_x_[in] = f * x[out];
+    inner_x_[in] = f / matrix_.scale * x[out];
   });
   const PcgSystem<K> system{
       static_cast<Index>(n) * B,
@@ -101,7 +102,8 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
       [&](const float* r, float* z) { precondition<K>(r, z); }};
   const PcgResult<K> result =
       pcg<K>(system, inner_b_.data(), inner_x_.data(), vectors_, options, poll);
-  if (result.finite) each([&](size_t in, size_t out, double f) { x[out] = inner_x_[in] / f; });
+  if (result.finite)
+    each([&](size_t in, size_t out, double f) { x[out] = matrix_.scale / f * inner_x_[in]; });
   if (!kept_) watch_.observe(result.iterations, result.digits);
   if (result.negative_curvature || !result.finite) watch_.fail();
   return result;

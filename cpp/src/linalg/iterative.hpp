@@ -35,6 +35,8 @@ class IterativeSolver {
   void set_scale();
   template <int K>
   void precondition(const float* r, float* z);
+  // Its scale is a power of two that brings the diagonal near one: single precision needs it, and
+  // what the preconditioner promises is measured against what steps gain.
   BlockRows<B> matrix_;
   std::vector<Index> order_;  // order_[new] = old, block rows
   std::vector<double> modes_;
@@ -46,7 +48,6 @@ class IterativeSolver {
   std::vector<double> inner_b_, inner_x_;  // kept, like the vectors, for the next solve
   std::vector<float> renumbered_r_, renumbered_z_;
   PcgVectors vectors_;
-  double scale_ = 1.0;  // power of two that brings the diagonal near one for single precision
 };
 
 }  // namespace stretchmap::linalg
