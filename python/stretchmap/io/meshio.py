@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import for_legacy_vtk
 from ..errors import FileFormatError, MissingDependencyError
 from .arrays import MeshArrays
 from .cells import Block, simplices
@@ -75,13 +74,12 @@ def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
     meshio = _import(f"writing {path.suffix} files")
     kind = "triangle" if mesh.T is None else "tetra"
     options: dict[str, Any] = {"data_format": "XML"} if file_format == "xdmf" else {}
-    plain = for_legacy_vtk if file_format == "vtk" else _plain
     with _guarded(path):
         out = meshio.Mesh(
             mesh.V,
             [(kind, mesh.elements)],
-            point_data={k: plain(a) for k, a in mesh.point_data.items()},
-            cell_data={k: [plain(a)] for k, a in mesh.cell_data.items()},
+            point_data={k: _plain(a) for k, a in mesh.point_data.items()},
+            cell_data={k: [_plain(a)] for k, a in mesh.cell_data.items()},
         )
         meshio._helpers._writer_map[file_format](str(path), out, **options)
 

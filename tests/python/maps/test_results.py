@@ -157,15 +157,6 @@ def test_solid_as_unstructured_grid(solid_map, tmp_path, suffix):
     np.testing.assert_allclose(grid.points, solid_map.mesh.V)
 
 
-def test_vtk_itself_reads_all_fields_of_its_legacy_format(solid_map, tmp_path):
-    pyvista = pytest.importorskip("pyvista")
-    solid_map.save(tmp_path / "map.vtk")
-    back = pyvista.read(tmp_path / "map.vtk")
-    given = solid_map.as_cells()
-    assert set(given.cell_data) <= set(back.cell_data.keys())
-    assert set(given.point_data) <= set(back.point_data.keys())
-
-
 def test_solid_in_a_surface_format_is_the_boundary_of_the_image(solid_map, tmp_path):
     path = tmp_path / "map.ply"
     solid_map.save(path)

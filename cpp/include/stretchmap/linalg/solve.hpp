@@ -10,9 +10,9 @@ struct SolveOptions {
   int max_iter = 500;         // conjugate-gradient steps (a direct solve: at most 3 refinements)
   bool must_converge = true;  // a goal not reached: true: SolverError, false: see SolveReport
   // Besides, conjugate gradients go on until the last step lowers the quadratic x'Ax / 2 - b'x, and
-  // was promised to by the preconditioner, by no more than this share of what a step did on average.
-  // Where entries differ by orders of magnitude, the residual is that of the largest alone. 0: the
-  // residual decides.
+  // was promised to by the preconditioner, by no more than this share of what a step did on
+  // average. Where entries differ by orders of magnitude, the residual is that of the largest
+  // alone. 0: the residual decides.
   double energy_share = 0.0;
 };
 
