@@ -9,13 +9,17 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # pybind11's moves of small matrices look uninitialized to it once they are inlined here.
   target_compile_options(_core PRIVATE -Wno-maybe-uninitialized)
 endif()
-if(NOT CMAKE_UNITY_BUILD)
+if(CMAKE_UNITY_BUILD)
+  include(cmake/lean_pybind11.cmake)
+  target_include_directories(_core SYSTEM BEFORE PRIVATE "${lean_pybind11}")
+  if(NOT MSVC)
+    # One unit is read faster than a header is precompiled, and to optimize what only converts would
+    # take most of the time of an install.
+    set_target_properties(_core PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
+    target_compile_options(_core PRIVATE -O1)
+  endif()
+else()
   target_precompile_headers(_core PRIVATE cpp/bindings/arrays.hpp)
-elseif(NOT MSVC)
-  # One unit is read faster than a header is precompiled, and to optimize what only converts would
-  # take most of the time of an install.
-  set_target_properties(_core PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
-  target_compile_options(_core PRIVATE -O1)
 endif()
 if(STRETCHMAP_INPLACE)
   set_target_properties(_core PROPERTIES LIBRARY_OUTPUT_DIRECTORY
