@@ -110,8 +110,6 @@ class Fit:
         The closest points of the goal.
     distance : float
         Root mean square between the two.
-    step : float
-        Of the last step, largest over the vertices; zero or nearly if it came to rest.
     energy : float
         Of bending and distance: the least of several fits is the one to be believed.
     """
@@ -119,7 +117,6 @@ class Fit:
     points: Array
     projected: Array
     distance: float
-    step: float
     energy: float
 
 
@@ -151,36 +148,54 @@ def fit_surface(
     Notes
     -----
     Iterative closest points with normals, from either surface to the other, the stiffness lowered
-    in steps (Chen and Medioni 1992; Amberg, Romdhani, Vetter, CVPR 2007). Pairs whose normals are
-    more than 60 degrees apart are left out.
+    in steps as long as that brings the surfaces closer (Chen and Medioni 1992; Amberg, Romdhani,
+    Vetter, CVPR 2007). Pairs whose normals are more than 60 degrees apart are left out.
     """
     template = template.coarse if coarse else template
+    rest = template.solid.surface.V
+    side = _Side(goal.V, goal.F)
+    coefficients, kept = _guess(template, start - rest), None
+    for stiffness in _STIFFNESS[:1] if coarse else _STIFFNESS:
+        coefficients = _drawn(template, side, coefficients, stiffness, landmarks)
+        found = _fit(template, side, coefficients)
+        # Where it is the faces of the meshes that keep them apart, a softer spline follows these,
+        # ends farther off and folds.
+        if kept is not None and not found.distance < kept.distance:
+            break
+        kept = found
+    assert kept is not None
+    return kept
+
+
+def _drawn(
+    template: Template, side: _Side, coefficients: Array, stiffness: float, landmarks: Array | None
+) -> Array:
+    """Coefficients at rest between bending and what draws onto the goal."""
     surface, spline = template.solid.surface, template.spline
     rest, F = surface.V, surface.F
-    side = _Side(goal.V, goal.F)
-    coefficients = _guess(template, start - rest)
-    step = np.inf
-    for stiffness in _STIFFNESS[:1] if coarse else _STIFFNESS:
-        for _ in range(_STEPS):
-            points = rest + template.features @ coefficients
-            equations = _Equations(len(spline.bending), stiffness * spline.bending)
-            _draw(equations, template, _Side(points, F), side)
-            if landmarks is not None and template.anchors is not None:
-                features = template.anchors.at(template.features, F)
-                equations.hold(features, landmarks - template.anchors.at(rest, F))
-            found = equations.solution()
-            step = float(np.abs(template.features @ (found - coefficients)).max())
-            coefficients = found
-            if step < _AT_REST * spline.length:
-                break
-    solid = template.solid
+    for _ in range(_STEPS):
+        points = rest + template.features @ coefficients
+        equations = _Equations(len(spline.bending), stiffness * spline.bending)
+        _draw(equations, template, _Side(points, F), side)
+        if landmarks is not None and template.anchors is not None:
+            features = template.anchors.at(template.features, F)
+            equations.hold(features, landmarks - template.anchors.at(rest, F))
+        found = equations.solution()
+        step = float(np.abs(template.features @ (found - coefficients)).max())
+        coefficients = found
+        if step < _AT_REST * spline.length:
+            break
+    return coefficients
+
+
+def _fit(template: Template, side: _Side, coefficients: Array) -> Fit:
+    solid, spline = template.solid, template.spline
     points = solid.V + spline.features(solid.V) @ coefficients
     skin = np.ascontiguousarray(points[solid.boundary_vertices])
     projected = side.tree.closest(skin)[0]
     square = float(((projected - skin) ** 2).sum(axis=1).mean())
     bending = float(np.einsum("rk,rs,sk->", coefficients, spline.bending, coefficients))
-    energy = square + _STIFFNESS[0] * bending
-    return Fit(points, projected, math.sqrt(square), step, energy)
+    return Fit(points, projected, math.sqrt(square), square + _STIFFNESS[0] * bending)
 
 
 class _Side:

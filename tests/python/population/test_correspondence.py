@@ -55,6 +55,17 @@ def test_a_pose_that_looks_as_good_is_not_taken():
     assert np.median(np.linalg.norm(found - truth, axis=1)) < 0.01 * size(truth)
 
 
+@pytest.mark.parametrize(("seed", "individual"), [(202, 1), (205, 2)])
+def test_coarse_meshes_are_not_followed_face_by_face(seed, individual):
+    """A softer spline would end farther off, folded or in another pose."""
+    bones = sm.samples.vertebra_population(individual + 1, seed=seed, n_tets=1200)
+    source, target = bones.solids[0], bones.solids[individual]
+    found, truth = correspond(source, target), bones.place(individual, bones.material[0])
+    errors = np.linalg.norm(found.image[: source.n_vertices] - truth, axis=1) / size(truth)
+    assert found.along == "smooth" and np.median(errors) < 0.015
+    assert np.percentile(errors, 95) < 0.04
+
+
 def test_affine_maps_are_recovered_exactly(bones):
     template = Template(bones.solids[0])
     matrix = np.eye(3) + 0.05 * np.random.default_rng(3).standard_normal((3, 3))
