@@ -28,11 +28,11 @@ void bind(py::module_& m) {
       .def_readonly("first_of_surface", &FitSamples::first_of_surface);
   py::class_<BoundaryFit>(m, "BoundaryFit")
       .def(py::init<const PointsRef&, const FacesRef&, const PointsRef&, const IndexVecRef&,
-                    const PointsRef&, const TetsRef&, int, double>(),
+                    const PointsRef&, const TetsRef&, int, double, bool>(),
            py::arg("points").noconvert(), py::arg("faces").noconvert(),
            py::arg("normals").noconvert(), py::arg("sample_faces").noconvert(),
            py::arg("sample_weights").noconvert(), py::arg("quads").noconvert(), py::arg("per_side"),
-           py::arg("far"), release_gil())
+           py::arg("far"), py::arg("bilinear") = false, release_gil())
       .def("match", &BoundaryFit::match, py::arg("x").noconvert(), release_gil());
 
   py::class_<HexReport>(m, "HexReport")

@@ -1,5 +1,9 @@
 #include "stretchmap/resample/boundary_fit.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+
 #include "stretchmap/base/parallel.hpp"
 
 namespace stretchmap::resample {
@@ -10,13 +14,52 @@ using Eigen::RowVector4d;
 using Eigen::Vector3d;
 
 constexpr Index kSamplesPerChunk = 512;
+constexpr int kTurns = 8;
+
+// Share of the way from a to b where that segment is closest to y.
+double closest_share(const RowVector3d& a, const RowVector3d& b, const RowVector3d& y) {
+  const RowVector3d along = b - a;
+  const double squared = along.squaredNorm();
+  return squared > 0.0 ? std::clamp((y - a).dot(along) / squared, 0.0, 1.0) : 0.0;
+}
+
+// A point of a bilinear patch, close to y if the one it starts from is: along its two families of
+// straight lines in turn. A warped quad is far from any triangles between its corners.
+struct PatchPoint {
+  double s, t;
+  RowVector3d at, facing;
+
+  PatchPoint(const std::array<RowVector3d, 4>& corner, const RowVector4d& start,
+             const RowVector3d& y)
+      : s(start[1] + start[2]), t(start[2] + start[3]) {
+    const auto mean = [](const RowVector3d& a, const RowVector3d& b, double w) -> RowVector3d {
+      return a + w * (b - a);
+    };
+    for (int turn = 0; turn < kTurns; ++turn) {
+      s = closest_share(mean(corner[0], corner[3], t), mean(corner[1], corner[2], t), y);
+      t = closest_share(mean(corner[0], corner[1], s), mean(corner[3], corner[2], s), y);
+    }
+    const RowVector3d low = mean(corner[0], corner[1], s), high = mean(corner[3], corner[2], s);
+    at = mean(low, high, t);
+    facing = (mean(corner[1], corner[2], t) - mean(corner[0], corner[3], t)).cross(high - low);
+  }
+
+  RowVector4d weights() const {
+    return {(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t};
+  }
+};
 
 }  // namespace
 
 BoundaryFit::BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
                          const IndexVecRef& sample_faces, const PointsRef& sample_weights,
-                         const TetsRef& quads, int per_side, double far)
-    : surface_(points, faces), normals_(normals), quads_(quads), per_side_(per_side), far_(far) {
+                         const TetsRef& quads, int per_side, double far, bool bilinear)
+    : surface_(points, faces),
+      normals_(normals),
+      quads_(quads),
+      per_side_(per_side),
+      far_(far),
+      bilinear_(bilinear) {
   const Index s = static_cast<Index>(sample_faces.size());
   sites_.setZero(s, 3);
   site_normals_.resize(s, 3);
@@ -117,14 +160,26 @@ void BoundaryFit::match_surface(const PointsRef& x, FitSamples& out) const {
           RowVector4d w = RowVector4d::Constant(0.25 * foot.weights[2]);
           w[c] += foot.weights[0];
           w[(c + 1) % 4] += foot.weights[1];
-          const auto corner = [&](int k) -> RowVector3d { return points.row(fans(foot.face, k)); };
-          const RowVector3d facing = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+          RowVector3d at = foot.point.transpose(), facing;
+          if (bilinear_) {
+            std::array<RowVector3d, 4> corner;
+            for (int k = 0; k < 4; ++k) corner[k] = x.row(quads_(quad, k));
+            const PatchPoint there(corner, w, sites_.row(i));
+            w = there.weights();
+            at = there.at;
+            facing = there.facing;
+          } else {
+            const auto corner = [&](int k) -> RowVector3d {
+              return points.row(fans(foot.face, k));
+            };
+            facing = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+          }
+          const RowVector3d gap = at - sites_.row(i);
           out.corners.row(j) = quads_.row(quad);
           out.weights.row(j) = w;
           out.point.row(j) = sites_.row(i);
-          out.normal.row(j) =
-              direction(site_normals_.row(i), foot.point.transpose() - sites_.row(i));
-          out.distance[j] = std::sqrt(foot.squared_distance);
+          out.normal.row(j) = direction(site_normals_.row(i), gap);
+          out.distance[j] = gap.norm();
           out.share[j] = facing.dot(site_normals_.row(i)) > 0.0 ? 1.0 / s : 0.0;
         }
       },

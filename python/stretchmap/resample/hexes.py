@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["HexMesh", "hex_mesh"]
 
 _MOST = 100_000  # hexahedra in any direction
+_MOST_ALONG = 1e9  # cubes along a side of the volume; more than memory holds by far
 _BYTES_PER_HEX = 12_000  # at the peak, with a hierarchy of the linear systems
 
 
@@ -96,11 +97,12 @@ def hex_mesh(
     Up to four choices of the numbers are begun with, sizes made even under a loose fit before the
     boundary is held to the surface; the two whose boundaries come closest are gone on with. The one
     that ends closer is returned; of two within half a per cent of the diagonal, or both farther and
-    about as far, the better shaped. A grid of more than 16,000 hexahedra with even numbers is
-    optimized with half the numbers first, then split in eight and finished; beyond 128,000 that is
-    done twice, and from 384,000 on choices are compared by half the numbers of the first grid and
-    one alone is gone on with. Where that fails in the solid as it is, its principal axes are made
-    equally long for the optimization.
+    about as far, the better shaped. What ends farther off than nine tenths of that has further
+    rounds, in which the largest gaps count more, and keeps them where they help. A grid of more
+    than 16,000 hexahedra with even numbers is optimized with half the numbers first, then split in
+    eight and finished; beyond 128,000 that is done twice, and from 384,000 on choices are compared
+    by half the numbers of the first grid and one alone is gone on with. Where that fails in the
+    solid as it is, its principal axes are made equally long for the optimization.
 
     References
     ----------
@@ -156,7 +158,7 @@ def _numbers(
         raise OptionError("give n_hexahedra or target_size, not both")
     if target_size is not None:
         size = real("target_size", target_size, above=0.0)
-        wanted = volume / size**3
+        wanted = min(volume ** (1.0 / 3.0) / size, _MOST_ALONG) ** 3
     else:
         wanted = whole("n_hexahedra", 5000 if n_hexahedra is None else n_hexahedra, 12)
     wanted = max(wanted, 12.0)

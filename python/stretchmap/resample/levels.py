@@ -28,9 +28,11 @@ __all__ = ["coarse_grid", "halvings_for", "levels_for", "refined", "require_vali
 _COARSE = 16_000  # hexahedra that are optimized at once ...
 _COMPARED = 6_000  # ... and, of grids split more than once, that choices are compared with
 _MANY = 100_000  # are finished with few steps, between two splits, too
-# Of grids as close to the surface as this share of the diagonal, or none of them, but all within
-# this factor of the closest, the shape decides.
-_CLOSE, _ALIKE = 0.005, 1.25
+# Of grids as close to the surface as these shares of the diagonal, or none of them, but all within
+# this factor of the closest, the shape decides. Of half a per cent samples may miss some.
+_CLOSE, _ALIKE = (0.0045, 0.005), 1.25
+# A grid that is farther off: one rim or tip is outweighed by all that lies well round it.
+_CLOSING = Schedule(powers=(12.0,) * 8, norm_share=4.0 / 3.0)
 # Of a grid that was split in eight: smaller quads fit better.
 _FINER = Schedule(
     fit=3.0,
@@ -163,7 +165,6 @@ def _best_optimized(starts: list[Start], solid: TetMesh, progress: Progress | No
     """
     ended: list[tuple[float, float, Start]] = []
     failure = None
-    diagonal = float(np.linalg.norm(np.ptp(solid.V, axis=0)))
     for start in starts:
         H = start.layout.H
         try:
@@ -171,11 +172,32 @@ def _best_optimized(starts: list[Start], solid: TetMesh, progress: Progress | No
         except SolverError as error:
             failure = failure or error
             continue
-        away = max(boundary_distances(V, boundary_quads(H), solid.surface)) / diagonal
-        least = float(_core.resample.scaled_jacobians(V, H).min())
-        ended.append((away, least, replace(start, V=V)))
+        ended.append(_judged(start, V, solid))
+        closer = _closer(V, H, solid, progress) if ended[-1][0] > _CLOSE[0] else None
+        if closer is not None:
+            ended.append(_judged(start, closer, solid))
     if failure is not None and not ended:
         raise failure
     closest = min(away for away, _, _ in ended)
-    limit = _CLOSE if closest <= _CLOSE else _ALIKE * closest
+    limit = next((close for close in _CLOSE if closest <= close), _ALIKE * closest)
     return max((end for end in ended if end[0] <= limit), key=lambda end: end[1])[2]
+
+
+def _judged(start: Start, V: NDArray[np.float64], solid: TetMesh) -> tuple[float, float, Start]:
+    """Distance from the surface over the diagonal, least scaled Jacobian, and the grid."""
+    H = start.layout.H
+    diagonal = float(np.linalg.norm(np.ptp(solid.V, axis=0)))
+    away = max(boundary_distances(V, boundary_quads(H), solid.surface)) / diagonal
+    return away, float(_core.resample.scaled_jacobians(V, H).min()), replace(start, V=V)
+
+
+def _closer(
+    V: NDArray[np.float64], H: NDArray[np.int32], solid: TetMesh, progress: Progress | None
+) -> NDArray[np.float64] | None:
+    """Points after rounds in which the largest gaps count more; None where these break down."""
+    optimizer = GridOptimizer(V, H, solid.surface, closely=True)
+    try:
+        optimizer.run(_CLOSING, progress)
+    except SolverError:
+        return None
+    return optimizer.V if missed_volume(optimizer.V, H, solid.surface) <= MOST_MISSED else None

@@ -29,13 +29,12 @@ _RESIDUAL = 0.01  # of their linear systems
 _SMOOTHING = 1  # rounds that the logarithms of the boxes' sides are averaged
 _MEAN = 0.3  # share of those means in the boxes; the rest are the edges themselves
 _GUARD = 0.5  # hexahedra whose edge triples are all better are judged by their corners alone
-_PER_SIDE = 3  # samples of a quad, squared, its corners among them
+_PER_SIDE = (3, 5)  # samples of a quad, squared, its corners among them; looked at closely
 _FAR = 0.5  # of the tolerance: gaps that are longer are closed along themselves
 _FIT = 60.0  # strength: a gap as large as the side of a mean quad costs as much as psi = 60
 _LOOSE = 0.5  # share of it while corners are not positive
 _TOLERANCE = 0.005  # of the diagonal: larger gaps count more ...
-_NORM = 2.0  # ... with the power 2 _NORM at least, ...
-_NORM_SHARE = 2.0 / 3.0  # ... in the end with twice this share of that of the shape
+_NORM = 2.0  # ... with the power 2 _NORM at least
 _OFFSET = 0.5  # share by which the error of the volume is made good from round to round ...
 _MOST_OFFSET = 1.0  # ... by a surface moved in or out by this many tolerances at most
 # Times the least gap so far: in needles the shape can win over the fit, and the grid swells.
@@ -56,6 +55,9 @@ class GridOptimizer:
     H : ndarray of int32, shape (k, 8)
     surface : TriMesh
         Boundary of the solid.
+    closely : bool
+        More samples, and distances to the quads of the boundary instead of triangles between their
+        corners.
 
     Attributes
     ----------
@@ -63,16 +65,19 @@ class GridOptimizer:
         Replaced as the grid gets better.
     """
 
-    def __init__(self, V: NDArray[np.float64], H: NDArray[np.int32], surface: TriMesh) -> None:
+    def __init__(
+        self, V: NDArray[np.float64], H: NDArray[np.int32], surface: TriMesh, closely: bool = False
+    ) -> None:
         self.V, self.H = np.array(V), H
         self._counts = np.bincount(H.ravel(), minlength=len(V))
         self._newton = _core.resample.HexNewton(H, len(V))
         quads = boundary_quads(H)
+        per_side = _PER_SIDE[closely]
         self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
         self._fit = _core.resample.BoundaryFit(
             surface.V, surface.F, vertex_normals(surface),
-            *surface_sites(surface, _PER_SIDE**2 * len(quads)), quads, _PER_SIDE,
-            _FAR * self._tolerance,
+            *surface_sites(surface, per_side**2 * len(quads)), quads, per_side,
+            _FAR * self._tolerance, closely,
         )  # fmt: skip
         self._strength = _FIT * len(quads) / surface.area
         self._area, self._volume, self._inward = surface.area, surface.volume, 0.0
@@ -80,7 +85,7 @@ class GridOptimizer:
         self._weights = np.full(len(H), 1.0 / len(H))
         self._guarded = np.zeros(len(H), bool)
         self._sizes, self._steps = ANY_SIZES, Schedule.steps
-        self._preconditioner = Schedule.preconditioner
+        self._preconditioner, self._norm_share = Schedule.preconditioner, Schedule.norm_share
         self._largest_gap = np.inf
         self._matched: NDArray[np.float64] | None = None  # the points of self._samples
 
@@ -93,6 +98,7 @@ class GridOptimizer:
             A linear solve broke down.
         """
         self._steps, self._preconditioner = schedule.steps, schedule.preconditioner
+        self._norm_share = schedule.norm_share
         if not self._untangle(schedule.untangle, progress):
             return False
         self._sizes = EVEN_SIZES
@@ -161,7 +167,7 @@ class GridOptimizer:
     def _norm(self, power: float) -> float:
         """Power of the gaps; that of a grid too coarse to get near the surface stays low."""
         gap = max(self._largest_gap / self._tolerance, 1.0)
-        return _NORM + max(_NORM_SHARE * power - _NORM, 0.0) / gap**2
+        return _NORM + max(self._norm_share * power - _NORM, 0.0) / gap**2
 
     def _descend(self, power: float, strength: float, norm: float) -> None:
         """Newton steps under the barrier, which guarded triples have to be inside of first."""

@@ -35,6 +35,8 @@ class Schedule:
         Factor of the fit in all other rounds.
     powers : tuple of float
         Power p of each round after that, see `hex_energy.hpp`.
+    norm_share : float
+        Gaps between boundary and surface count with twice this share of those powers.
     steps : int
         Newton steps between two looks at boxes and samples.
     preconditioner : str
@@ -54,5 +56,6 @@ class Schedule:
         *(8.0,) * 8,
         *(12.0,) * 10,
     )
+    norm_share: float = 2.0 / 3.0
     steps: int = 3
     preconditioner: str = "multigrid"

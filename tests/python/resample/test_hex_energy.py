@@ -96,6 +96,34 @@ def test_samples_lie_on_both_surfaces():
     assert 0.0 < matched.distance.max() < 0.5
 
 
+def test_gaps_seen_closely_are_those_to_bilinear_quads():
+    """Which are what a warped face of a hexahedron is, not triangles between its corners."""
+    cube = np.ascontiguousarray(np.indices((2, 2, 2)).reshape(3, -1).T, float)
+    one = np.array([[0, 4, 6, 2, 1, 5, 7, 3]], np.int32)
+    cube[[1, 7], 2] += 0.8  # opposite corners of its top
+    x, y = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(0.35, 0.65, 7)]))
+    sites = np.stack([x, y, 1.6 + 0.0 * x], axis=1)
+    grid = np.arange(49).reshape(7, 7)
+    a, b, c = grid[:-1, :-1].ravel(), grid[:-1, 1:].ravel(), grid[1:, 1:].ravel()
+    F = np.ascontiguousarray(np.stack([a, b, c], axis=1), np.int32)
+    faces = np.arange(len(F), dtype=np.int32)
+    weights = np.ascontiguousarray(np.tile([1.0, 0.0, 0.0], (len(F), 1)))
+    normals = np.ascontiguousarray(np.tile([0.0, 0.0, 1.0], (49, 1)))
+    s, t = (k.ravel() for k in np.meshgrid(*2 * [np.linspace(0.0, 1.0, 301)]))
+    patch = np.stack([s, t, 1.0 + 0.8 * ((1 - s) * (1 - t) + s * t)], axis=1)
+    expected = np.linalg.norm(patch - sites[a][:, None], axis=2).min(axis=1)
+    quads, errors = boundary_quads(one), []
+    for closely in (True, False):
+        fit = _core.resample.BoundaryFit(
+            sites, F, normals, faces, weights, quads, 2, 0.1, bilinear=closely
+        )
+        matched = fit.match(cube)
+        found = matched.distance[matched.first_of_surface :]
+        errors.append(np.abs(found - expected).max())
+        assert (matched.share[matched.first_of_surface :] > 0.0).all()
+    assert errors[0] < 2e-3 < 0.02 < errors[1]
+
+
 def test_a_tip_beyond_the_grid_pulls_along_itself():
     """Points of its sides do, too, though their tangent planes hold the grid already."""
     cube = np.array(

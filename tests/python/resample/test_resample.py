@@ -174,6 +174,8 @@ def test_the_size_wanted_is_met(bumpy_map):
     assert 0.8 < len(by_size.H) / 700 < 1.25
     with pytest.raises(OptionError, match="not both"):
         hex_mesh(bumpy_map, target_size=size, n_hexahedra=700)
+    fewest = hex_mesh(bumpy_map, target_size=1e200, optimize=False)
+    assert len(fewest.H) < 40
 
 
 @pytest.mark.parametrize(
@@ -184,6 +186,7 @@ def test_the_size_wanted_is_met(bumpy_map):
         {"sections": 10**5, "block": 10**4, "rings": 10**4},
         {"n_hexahedra": 10**12},
         {"target_size": 1e-9},
+        {"target_size": 1e-200},
     ],
 )
 def test_grids_larger_than_memory_are_refused_at_once(standard, numbers):

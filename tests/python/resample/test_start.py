@@ -70,7 +70,7 @@ def test_of_the_two_closest_the_one_that_ends_closer_is_returned(monkeypatch):
     closer, farther = sorted(alone, key=lambda start: quality(start)[0])
     better = max(alone, key=lambda start: quality(start)[1])
     for close, alike, expected in ((0.0, 1.0, closer), (0.0, 1e9, better), (1.0, 1.0, better)):
-        monkeypatch.setattr(levels, "_CLOSE", close)
+        monkeypatch.setattr(levels, "_CLOSE", (close,))
         monkeypatch.setattr(levels, "_ALIKE", alike)
         for order in (starts, starts[::-1]):
             assert levels._best_optimized(order, solid, None).numbers == expected.numbers
@@ -86,6 +86,43 @@ def test_of_the_two_closest_the_one_that_ends_closer_is_returned(monkeypatch):
     assert levels._best_optimized(starts, solid, None).numbers == farther.numbers
     with pytest.raises(SolverError, match="not valid"):
         levels._best_optimized([closer], solid, None)
+
+
+def test_a_grid_far_off_is_brought_closer_if_that_helps(monkeypatch):
+    """And one whose further rounds break down, fold it or lead away is returned as it was."""
+    result, solid = a_ring()
+    starts = best_starts(result, solid, [(24, 3, 1)])
+    H = starts[0].layout.H
+    quads = boundary_quads(H)
+
+    def away(start):
+        return max(boundary_distances(start.V, quads, solid.surface))
+
+    found = {}
+    for close in (1.0, 0.0):
+        monkeypatch.setattr(levels, "_CLOSE", (close,))
+        monkeypatch.setattr(levels, "_ALIKE", 1.0)
+        found[close] = levels._best_optimized(starts, solid, None)
+    assert away(found[0.0]) < 0.9 * away(found[1.0])
+
+    class Breaks(GridOptimizer):
+        def run(self, *rest):
+            raise SolverError("a pivot is not positive")
+
+    class Folds(GridOptimizer):
+        def run(self, *rest):
+            self.V = self.V[:, ::-1].copy()
+            return True
+
+    class Leads(GridOptimizer):
+        def run(self, *rest):
+            self.V = 0.999 * self.V
+            return True
+
+    monkeypatch.setattr(levels, "optimized", lambda V, *rest: found[1.0].V)
+    for failing in (Breaks, Folds, Leads):
+        monkeypatch.setattr(levels, "GridOptimizer", failing)
+        assert np.array_equal(levels._best_optimized(starts, solid, None).V, found[1.0].V)
 
 
 def stretched(solid, length):

@@ -6,7 +6,8 @@
 // and points of the surface against the closest ones of the grid. n_j is the normal of the surface,
 // so that points of the grid glide along it at no cost (distance to the tangent plane), turned the
 // more into the direction of the gap the longer that is. Quads are
-// bilinear; to find their closest points each is replaced by four triangles with its center.
+// bilinear; to find their closest points each is replaced by four triangles with its center, which
+// long and warped ones are far from: where it matters points are moved on to the quad itself.
 #pragma once
 
 #include "stretchmap/maps/surface_tree.hpp"
@@ -36,9 +37,10 @@ class BoundaryFit {
   // \param quads (q, 4) of the grid, seen from outside; per_side^2 samples are taken of each,
   //        corners among them, per_side > 1.
   // \param far gaps this long are closed half-way between the normal and their own direction.
+  // \param bilinear closest points of the grid are moved from the triangles to the quads.
   BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
               const IndexVecRef& sample_faces, const PointsRef& sample_weights,
-              const TetsRef& quads, int per_side, double far);
+              const TetsRef& quads, int per_side, double far, bool bilinear = false);
 
   // \param x points of the grid.
   // \return their samples.
@@ -57,6 +59,7 @@ class BoundaryFit {
   Tets quads_;
   int per_side_;
   double far_;
+  bool bilinear_;
 };
 
 }  // namespace stretchmap::resample
