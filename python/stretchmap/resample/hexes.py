@@ -97,12 +97,12 @@ def hex_mesh(
     Up to four choices of the numbers are begun with, sizes made even under a loose fit before the
     boundary is held to the surface; the two whose boundaries come closest are gone on with. The one
     that ends closer is returned; of two within half a per cent of the diagonal, or both farther and
-    about as far, the better shaped. What ends farther off than nine tenths of that has further
-    rounds, in which the largest gaps count more, and keeps them where they help. A grid of more
-    than 16,000 hexahedra with even numbers is optimized with half the numbers first, then split in
-    eight and finished; beyond 128,000 that is done twice, and from 384,000 on choices are compared
-    by half the numbers of the first grid and one alone is gone on with. Where that fails in the
-    solid as it is, its principal axes are made equally long for the optimization.
+    about as far, the better shaped. What ends between nine tenths and twice that off has further
+    rounds, in which the largest gaps count more, and keeps them where they bring it within. A grid
+    of more than 16,000 hexahedra with even numbers is optimized with half the numbers first, then
+    split in eight and finished; beyond 128,000 that is done twice, and from 384,000 on choices are
+    compared by half the numbers of the first grid and one alone is gone on with. Where that fails
+    in the solid as it is, its principal axes are made equally long for the optimization.
 
     References
     ----------

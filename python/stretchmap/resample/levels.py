@@ -31,7 +31,9 @@ _MANY = 100_000  # are finished with few steps, between two splits, too
 # Of grids as close to the surface as these shares of the diagonal, or none of them, but all within
 # this factor of the closest, the shape decides. Of half a per cent samples may miss some.
 _CLOSE, _ALIKE = (0.0045, 0.005), 1.25
-# A grid that is farther off: one rim or tip is outweighed by all that lies well round it.
+# A grid that is farther off, by up to this factor of those: one rim or tip is outweighed by all
+# that lies well round it. Angles pay for it, for nothing where half a per cent is not reached.
+_REACH = 2.0
 _CLOSING = Schedule(powers=(12.0,) * 8, norm_share=4.0 / 3.0)
 # Of a grid that was split in eight: smaller quads fit better.
 _FINER = Schedule(
@@ -173,9 +175,11 @@ def _best_optimized(starts: list[Start], solid: TetMesh, progress: Progress | No
             failure = failure or error
             continue
         ended.append(_judged(start, V, solid))
-        closer = _closer(V, H, solid, progress) if ended[-1][0] > _CLOSE[0] else None
-        if closer is not None:
-            ended.append(_judged(start, closer, solid))
+        if _CLOSE[0] < ended[-1][0] <= _REACH * _CLOSE[-1]:
+            closer = _closer(V, H, solid, progress)
+            further = None if closer is None else _judged(start, closer, solid)
+            if further is not None and further[0] <= _CLOSE[-1]:
+                ended.append(further)
     if failure is not None and not ended:
         raise failure
     closest = min(away for away, _, _ in ended)

@@ -89,7 +89,10 @@ def test_of_the_two_closest_the_one_that_ends_closer_is_returned(monkeypatch):
 
 
 def test_a_grid_far_off_is_brought_closer_if_that_helps(monkeypatch):
-    """And one whose further rounds break down, fold it or lead away is returned as it was."""
+    """And one whose further rounds break down, fold it or lead away is returned as it was.
+
+    So is one that is close already, or that they do not get there.
+    """
     result, solid = a_ring()
     starts = best_starts(result, solid, [(24, 3, 1)])
     H = starts[0].layout.H
@@ -99,11 +102,14 @@ def test_a_grid_far_off_is_brought_closer_if_that_helps(monkeypatch):
         return max(boundary_distances(start.V, quads, solid.surface))
 
     found = {}
-    for close in (1.0, 0.0):
+    monkeypatch.setattr(levels, "_ALIKE", 1.0)
+    for close in (1.0, 0.004, 0.0035, 0.001):
         monkeypatch.setattr(levels, "_CLOSE", (close,))
-        monkeypatch.setattr(levels, "_ALIKE", 1.0)
         found[close] = levels._best_optimized(starts, solid, None)
-    assert away(found[0.0]) < 0.9 * away(found[1.0])
+    assert away(found[0.004]) < 0.9 * away(found[1.0])
+    for out_of_reach in (0.0035, 0.001):
+        assert np.array_equal(found[out_of_reach].V, found[1.0].V)
+    monkeypatch.setattr(levels, "_CLOSE", (0.004,))
 
     class Breaks(GridOptimizer):
         def run(self, *rest):
