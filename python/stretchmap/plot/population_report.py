@@ -64,12 +64,15 @@ def write_population_report(
 
 def _parts(population: Population) -> list[str]:
     found = population.to_dict()
-    figures = {k: v for k, v in found.items() if k not in ("shapes", "versions", "outliers")}
+    figures = {
+        k: v for k, v in found.items() if k not in ("shapes", "versions", "outliers", "doubts")
+    }
     sound = found["all_certified"] and found["mean_certified"]
     verdict = "All maps are certified. " if sound else "Not all maps are certified. "
     if population.skipped:
         verdict += f"Skipped: {', '.join(population.skipped)}. "
-    style = "yes" if sound and not population.skipped else "no"
+    verdict += " ".join(f"{name}: {doubt}. " for name, doubt in population.doubts.items())
+    style = "yes" if sound and not population.skipped and not population.doubts else "no"
     parts = [
         f'<p class="verdict {style}"><b>{html.escape(verdict)}</b>'
         f"{html.escape(population.stop_reason)}.</p>",

@@ -10,13 +10,14 @@ from .. import _core
 from ..mesh.meshes import TriMesh
 from .procrustes import Similarity
 
-__all__ = ["rigid_poses", "same_pose"]
+__all__ = ["looks_mirrored", "rigid_poses", "same_pose"]
 
 _FEW, _MANY = 80, 250  # faces of either surface that are compared, at first and then
 _FIRST, _KEPT, _LAST = 5, 8, 30  # steps of every start, starts that go on, and steps of those
 _NEARLY, _MOST = 2.0, 6  # distance over the least of what is kept, and how many that are
 _SAME = 1.0 + 2.0 * np.cos(np.radians(20.0))  # trace of the rotation between two that are one
 _AT_REST = 1e-6
+_MIRRORED = 0.8  # distance of the mirror image over that of the surface: 0.94 at least of vertebrae
 
 Array = NDArray[np.float64]
 
@@ -66,14 +67,7 @@ def rigid_poses(moving: TriMesh, goal: TriMesh) -> list[Similarity]:
         The closest first; others that differ from it and are nearly as close, which for a body
         with processes on all sides may be the right ones.
     """
-    first, second = _Samples(moving, _FEW), _Samples(goal, _FEW)
-    base = first.axes.T @ second.axes
-    starts = base @ Rotation.create_group("I").as_matrix()
-    coarse = [_improved(first, second, start, np.zeros(3), _FIRST) for start in starts]
-    coarse.sort(key=lambda pose: pose[0])
-    first, second = _Samples(moving, _MANY), _Samples(goal, _MANY)
-    fine = [_improved(first, second, pose[1], pose[2], _LAST) for pose in coarse[:_KEPT]]
-    fine.sort(key=lambda pose: pose[0])
+    fine, first, second = _ranked(moving, goal)
     distinct: list[tuple[float, Array, Array]] = []
     for pose in fine:
         near = [np.einsum("ij,ij->", pose[1], other[1]) > _SAME for other in distinct]
@@ -86,6 +80,28 @@ def rigid_poses(moving: TriMesh, goal: TriMesh) -> list[Similarity]:
         )
         for _, turn, shift in distinct[:_MOST]
     ]
+
+
+def looks_mirrored(moving: TriMesh, goal: TriMesh) -> bool:
+    """Whether a surface, as a rigid body, comes clearly closer to the mirror image of another."""
+    mirrored = TriMesh(goal.V * [-1.0, 1.0, 1.0], goal.F[:, ::-1])
+    distances = [_ranked(moving, other)[0][0][0] for other in (mirrored, goal)]
+    return distances[0] < _MIRRORED * distances[1]
+
+
+def _ranked(
+    moving: TriMesh, goal: TriMesh
+) -> tuple[list[tuple[float, Array, Array]], _Samples, _Samples]:
+    """Distance, rotation and shift of the best starts, closest first, and what was compared."""
+    first, second = _Samples(moving, _FEW), _Samples(goal, _FEW)
+    base = first.axes.T @ second.axes
+    starts = base @ Rotation.create_group("I").as_matrix()
+    coarse = [_improved(first, second, start, np.zeros(3), _FIRST) for start in starts]
+    coarse.sort(key=lambda pose: pose[0])
+    first, second = _Samples(moving, _MANY), _Samples(goal, _MANY)
+    fine = [_improved(first, second, pose[1], pose[2], _LAST) for pose in coarse[:_KEPT]]
+    fine.sort(key=lambda pose: pose[0])
+    return fine, first, second
 
 
 def _improved(

@@ -56,6 +56,9 @@ class Population(HasSummary):
         square over its size.
     converged : bool
     stop_reason : str
+    doubts : dict of str to str
+        By name, what may be wrong with shapes that were mapped all the same: that they look
+        mirrored, or are in another unit.
     folder : Path or None
         With a map of every shape.
     shapes : tuple of Shape
@@ -82,6 +85,7 @@ class Population(HasSummary):
     moved: tuple[float, ...]
     converged: bool
     stop_reason: str
+    doubts: dict[str, str] = field(default_factory=dict)
     folder: Path | None = None
     shapes: tuple[Shape, ...] = field(default=(), repr=False)
 
@@ -187,6 +191,7 @@ class Population(HasSummary):
         found: dict[str, Any] = {
             "n_shapes": len(self.names),
             "skipped": self.skipped,
+            "doubts": self.doubts,
             "n_vertices": self.mean.n_vertices,
             "n_tets": self.mean.n_tets,
             "all_certified": all(r["certified"] for r in self.records if r["ok"]),
@@ -218,6 +223,7 @@ class Population(HasSummary):
         }  # fmt: skip
         rows["template moved, last"] = self.moved[-1]
         rows["skipped"] = ", ".join(self.skipped) or "none"
+        rows["doubtful"] = ", ".join(self.doubts) or "none"
         rows["by areas, not smooth"] = ", ".join(found["by_areas"]) or "none"
         rows["standard deviations"] = found["standard_deviations"][:6]
         for name in ("compactness", "generalization", "specificity"):

@@ -41,6 +41,7 @@ _log = logging.getLogger("stretchmap")
 
 _COLD_ROUNDS = 2  # in which every shape is laid on the template anew; then from where it was
 _TEMPLATE = "template"  # name of its landmarks, if it is none of the shapes
+_OTHER_UNIT = 5.0  # times longer or shorter than the median
 
 Array = NDArray[np.float64]
 Solids = str | Path | Sequence[Any] | Mapping[str, Any]
@@ -110,7 +111,9 @@ def fit(
 
     Notes
     -----
-    A shape that cannot be read or mapped is skipped: it is in ``skipped`` with the reason.
+    A shape that cannot be read or mapped is skipped: it is in ``skipped`` with the reason; so is
+    one whose landmarks are those of a mirror image. One that is mapped though it looks mirrored, or
+    far larger or smaller than the others, is in ``doubts``.
     Groupwise mean after Joshi, Davis, Jomier, Gerig, NeuroImage 23, 2004, with correspondences in
     place of diffeomorphisms.
 
@@ -215,6 +218,7 @@ class _Run:
     volume_weight: float
     progress: Progress | None
     faults: dict[int, str] = field(default_factory=dict)  # of shapes, in the last round
+    doubts: dict[str, str] = field(default_factory=dict)  # by name, from the first round
 
     def until_at_rest(
         self, solid: TetMesh, anchors: Anchors | None, max_rounds: int, tol: float
@@ -247,6 +251,7 @@ class _Run:
             moved=tuple(moved),
             converged=at_rest,
             stop_reason="template at rest" if at_rest else "most rounds done",
+            doubts=self.doubts,
             folder=self.folder,
             shapes=tuple(self.shapes),
         )
@@ -275,8 +280,27 @@ class _Run:
         if len(done) < 2:
             reason = next((r["error"] for r in records.values() if not r["ok"]), "only one given")
             raise SolverError(f"{len(done)} shapes could be mapped, two are needed; {reason}")
+        if number == 0:
+            self.doubts = _doubts([records[i] for i in done])
+            for name, doubt in self.doubts.items():
+                _log.warning("%s: %s", name, doubt)
         images, smooth = np.stack([np.load(jobs[i].image_file) for i in done], axis=1)
         return [records[i] for i in range(len(jobs))], images, smooth
+
+
+def _doubts(records: list[Record]) -> dict[str, str]:
+    """What may be wrong with shapes that could be mapped, by name."""
+    lengths = np.cbrt([record["volume"] for record in records])
+    found = {}
+    for record, times in zip(records, lengths / np.median(lengths), strict=True):
+        far = max(times, 1.0 / times)
+        doubts = [record["doubt"]] if record["doubt"] else []
+        if far > _OTHER_UNIT:
+            word = "large" if times > 1.0 else "small"
+            doubts.append(f"{far:.4g} times as {word} as the median: is it in another unit?")
+        if doubts:
+            found[record["name"]] = "; ".join(doubts)
+    return found
 
 
 def _write_template(path: Path, solid: TetMesh, anchors: Anchors | None) -> str:

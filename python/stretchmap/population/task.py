@@ -25,8 +25,10 @@ from ..base.tables import plain_dict
 from ..base.threads import threads
 from ..errors import LandmarkError, StretchmapError
 from ..io.reading import read_solid
+from ..registration.mirror import MIRROR_ADVICE, mirrored_landmarks
 from .correspondence import Along, correspond
 from .fitting import Anchors, Template
+from .pose import looks_mirrored
 from .shapes import Shape
 
 __all__ = ["Job", "Record", "failed", "run_job"]
@@ -131,6 +133,10 @@ def _mapped(job: Job) -> Record:
         wanted = len(template.anchors.faces)
         if len(marks) != wanted:
             raise LandmarkError(f"{len(marks)} landmarks, the template has {wanted}")
+        surface = template.solid.surface
+        mirrored = mirrored_landmarks(template.anchors.at(surface.V, surface.F), marks)
+        if mirrored:
+            raise LandmarkError(mirrored)
     start = None
     if job.warm and job.image_before.exists():
         start = np.load(job.image_before)[0, template.solid.boundary_vertices]
@@ -141,10 +147,14 @@ def _mapped(job: Job) -> Record:
     found.save(job.map_file)
     with atomic_path(job.image_file) as temporary, open(temporary, "wb") as file:
         np.save(file, np.stack([found.image[: template.solid.n_vertices], found.smooth]))
+    # An average of shapes some of which are mirrored is as good as symmetric and does not tell.
+    doubtful = job.round == 0 and marks is None
+    doubtful = doubtful and looks_mirrored(template.solid.surface, solid.surface)
     return {
         "name": job.shape.name,
         "round": job.round,
         "ok": True,
+        "doubt": f"closer to the template after a reflection: {MIRROR_ADVICE}" if doubtful else "",
         "n_tets": solid.n_tets,
         "volume": solid.volume,
         "certified": found.certificate.certified,

@@ -21,7 +21,7 @@ from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..certificate.checks import certify
 from ..certificate.findings import require_certified
-from ..errors import ArrayError, CertificationError, SolverError
+from ..errors import ArrayError, CertificationError, LandmarkError, SolverError
 from ..maps.history import IterationRecord
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
@@ -35,6 +35,7 @@ from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
 from .match import match_surfaces
+from .mirror import mirrored_landmarks
 from .result import LandmarkMap, Registration
 
 __all__ = ["register"]
@@ -103,7 +104,8 @@ def register(
     MeshError
         A mesh is not a solid torus, see `TetMesh.require_solid_torus`.
     LandmarkError
-        Landmarks contradict each other; ``ids`` are the two at fault.
+        Landmarks contradict each other; ``ids`` are the two at fault. Where they fit far better
+        after a reflection, the message says so.
     CertificationError
         The map is not a bijection, ``ids`` are the elements.
     OptionError
@@ -140,9 +142,15 @@ def register(
     marks = _landmarks(landmarks, source, target)
     seconds: dict[str, float] = {}
     clock = time.perf_counter()
-    embedded, gauge, history = _boundary_map(
-        source, target, marks, landmark_map, max_iter, tol, progress
-    )
+    mirrored = mirrored_landmarks(source.V[marks.source], target.V[marks.target])
+    if mirrored:
+        _log.warning("%s", mirrored)
+    try:
+        embedded, gauge, history = _boundary_map(
+            source, target, marks, landmark_map, max_iter, tol, progress
+        )
+    except LandmarkError as error:
+        raise LandmarkError(f"{error}; {mirrored}" if mirrored else str(error), error.ids) from None
     seconds["boundary"] = time.perf_counter() - clock
     if len(embedded.crossings) and not keep_best:
         raise CertificationError(
