@@ -10,7 +10,7 @@ import typer
 
 from . import common
 from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet, Threads
-from .results import MaxIter, Phase, Ratio, conclude, parsed_ratio
+from .results import Balance, MaxIter, Phase, Ratio, conclude, parsed_ratio
 
 _log = logging.getLogger("stretchmap")
 
@@ -63,6 +63,7 @@ def area(
         Finish | None,
         typer.Option(help="Finish on the faces' areas, then on the vertex rings' (default)."),
     ] = None,
+    balance: Balance = None,
     max_iter: MaxIter = None,
     tol: Annotated[
         float | None, typer.Option(help="Goal for the SD of the face ratios.", show_default=False)
@@ -86,6 +87,7 @@ def area(
     watch = common.Stopwatch()
     options: dict[str, Any] = {
         "finish": None if finish is None else finish.value,
+        "balance": balance,
         "max_iter": max_iter,
         "tol": tol,
         "ratio": parsed_ratio(ratio),

@@ -21,6 +21,10 @@ Phase = Annotated[
     float | None,
     typer.Option(help="Turns around the tube; searched if left out.", show_default=False),
 ]
+Balance = Annotated[
+    float | None,
+    typer.Option(help="From 0, pieces keep their shape, to 1 (default), their size."),
+]
 MaxIter = Annotated[int | None, typer.Option(help="Most steps.", show_default=False)]
 
 

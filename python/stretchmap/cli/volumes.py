@@ -12,7 +12,7 @@ import typer
 
 from . import common
 from .common import Compact, Input, Json, Orient, Output, Quiet, Threads
-from .results import MaxIter, Phase, Ratio, conclude, parsed_ratio
+from .results import Balance, MaxIter, Phase, Ratio, conclude, parsed_ratio
 
 if TYPE_CHECKING:
     import numpy as np
@@ -67,10 +67,7 @@ def volume(
     c: Annotated[
         float | None, typer.Option("--c", help="Regularisation (5.6) of vsem, dimensionless.")
     ] = None,
-    balance: Annotated[
-        float | None,
-        typer.Option(help="From 0, pieces keep their shape, to 1 (default), their volume."),
-    ] = None,
+    balance: Balance = None,
     max_iter: MaxIter = None,
     tol: Annotated[
         float | None,

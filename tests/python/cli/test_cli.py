@@ -96,6 +96,15 @@ def test_area_of_a_solid_is_that_of_its_boundary(folder, solid):
         assert np.array_equal(a["image"], b["image"])
 
 
+def test_area_takes_a_balance_as_volume_does(folder, solid, capsys):
+    assert main(["area", "solid.npz", "-o", "a.npz", "--balance", "0.2", "-q"]) == 0
+    expected = sm.area_map(solid.surface, balance=0.2)
+    assert np.array_equal(sm.load_map("a.npz").image, expected.image)
+    assert expected.distortion.angle_mean < sm.area_map(solid.surface).distortion.angle_mean
+    assert main(["area", "solid.npz", "-o", "b.npz", "--balance", "1.5", "-q"]) == 2
+    assert "balance must be at least 0 and at most 1" in capsys.readouterr().err
+
+
 def test_quiet_prints_nothing(folder, capsys):
     assert main(["conformal", "surface.ply", "-o", "map.npz", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
