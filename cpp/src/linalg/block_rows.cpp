@@ -3,7 +3,6 @@
 #include <cstddef>
 
 #include "stretchmap/base/parallel.hpp"
-#include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::linalg {
 namespace {

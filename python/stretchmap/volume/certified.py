@@ -1,9 +1,10 @@
-"""The certified route: from one start after the other, until a map is proven."""
+"""The certified route: from one start after the other, until a map is proven and all of it free."""
 
 from __future__ import annotations
 
 import dataclasses
 import logging
+import math
 import time
 
 from ..base.progress import Progress
@@ -11,6 +12,7 @@ from ..mesh.meshes import TetMesh
 from .budget import Budget
 from .engine import solve
 from .options import VolumeOptions
+from .problem import Outcome
 from .ranked_starts import Start, ranked_starts
 from .result import VolumeMap, volume_result
 
@@ -18,6 +20,7 @@ __all__ = ["certified_map"]
 
 _log = logging.getLogger("stretchmap")
 
+_MINIMIZED = ("frozen", "glide")  # stages whose energies are comparable
 _WORTH_A_START = 0.1  # share of the time; with less left no further one is made
 
 
@@ -30,6 +33,8 @@ def certified_map(
     progress: Progress | None,
 ) -> VolumeMap:
     """The map from the first start that leads to a certified one, or the best there is.
+
+    Where folded faces had to be held for that, the others are tried in the time left.
 
     Parameters
     ----------
@@ -45,7 +50,8 @@ def certified_map(
     starts = iter([start] if start is not None else [])
     if start is None:
         starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)
-    best, clock, vain = None, time.perf_counter(), 0.0
+    best, least, best_took = None, (True, 0, True, math.inf), 0.0
+    vain, clock = 0.0, time.perf_counter()
     for begin in starts:
         outcome = solve(
             begin.problem,
@@ -57,26 +63,37 @@ def certified_map(
         )
         seconds = {**outcome.seconds, "start": begin.seconds + outcome.seconds["start"]}
         outcome = dataclasses.replace(outcome, seconds=seconds)
-        vain += begin.others
         found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
-        if best is None or _better(found, best):
-            best = found
-        if best.certificate.certified or budget.left < _WORTH_A_START * budget.seconds:
+        clock, took = time.perf_counter(), time.perf_counter() - clock
+        vain += begin.others
+        rank = _rank(outcome, found)
+        if best is None or rank < least:
+            vain += best_took
+            best, least, best_took = found, rank, took
+        else:
+            vain += took
+        if best.certificate.certified and not least[2]:
+            break
+        if budget.left < _WORTH_A_START * budget.seconds:
             break
         if not best.certificate.checks.get("source_embedded", True):
             break  # no start mends the source
-        vain = time.perf_counter() - clock
-        _log.info("not certified (%s): once more from another start", best.certificate.reason)
+        held = f"{len(outcome.problem.held)} vertices are held"
+        why = held if found.certificate.certified else f"not certified ({best.certificate.reason})"
+        _log.info("%s: once more from another start", why)
     assert best is not None
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
 
 
-def _better(one: VolumeMap, other: VolumeMap) -> bool:
-    """Certified, or else with fewer flipped tets."""
-
-    def rank(result: VolumeMap) -> tuple[bool, int]:
-        return result.certificate.certified, -int(result.distortion.flips or 0)
-
-    return rank(one) > rank(other)
+def _rank(outcome: Outcome, found: VolumeMap) -> tuple[bool, int, bool, float]:
+    """Least of what is certified, or else has fewest flipped tets; then where nothing is held, and
+    last of the lowest energy."""
+    minimized = [record.energy for record in outcome.history if record.stage in _MINIMIZED]
+    return (
+        not found.certificate.certified,
+        found.distortion.flips or 0,
+        len(outcome.problem.held) > 0,
+        minimized[-1] if minimized else math.inf,
+    )

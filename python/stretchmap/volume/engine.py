@@ -300,6 +300,8 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
                         free=free,
                     )  # fmt: skip
         converged, reason, newton = done.converged, done.reason, done.newton
+        if converged and len(run.problem.held):
+            converged, reason = False, f"{len(run.problem.held)} vertices of folded faces are held"
         if not _keep(run, done.x, True, "the map with a held boundary is kept"):
             return False, "gliding would fold the boundary", None
     return converged, reason, newton

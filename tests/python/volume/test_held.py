@@ -108,6 +108,7 @@ def test_what_is_not_certified_has_not_converged(monkeypatch):
 def test_the_first_start_has_no_folded_face_if_that_can_be_had(monkeypatch):
     plain = sm.area_map(SOLID.surface, finish="none", ratio="search")
     folded = sm.certify(SOLID.surface, plain.image * [1.0, 1.0, -1.0], plain.torus)
+    folded = dataclasses.replace(folded, ids={"boundary_oriented": (0,)})
     found = dataclasses.replace(plain, certificate=folded)
     monkeypatch.setattr(boundary_starts_module, "along", lambda *_: found)
     starts = list(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
@@ -127,9 +128,9 @@ def test_the_second_start_has_a_fatter_torus_unless_its_ratio_is_given():
 def test_where_equal_areas_fold_a_start_keeps_shapes():
     solid = with_branch(sm.samples.bumpy_torus(1000), 20, 0.5)
     starts = boundary_starts(solid, VolumeOptions(), glide=True, progress=None)
-    areas, shapes = next(starts), next(starts)
+    shapes = next(starts)
+    areas = sm.area_map(solid.surface, finish="none", ratio=shapes.ratio)
     assert shapes.certificate.certified and not areas.certificate.certified
-    assert shapes.ratio == areas.ratio
     assert shapes.distortion.angle_mean < areas.distortion.angle_mean
     found = sm.volume_map(solid)
     assert found.certificate.certified and found.distortion.flips == 0
@@ -163,7 +164,8 @@ def test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monk
 def test_one_that_cannot_be_released_is_gone_on_with_all_the_same(problem, monkeypatch):
     monkeypatch.setattr(engine, "_release", lambda run: False)
     outcome = solved_after_holding(problem, monkeypatch)
-    assert outcome.converged and len(outcome.problem.held) == 9
+    assert len(outcome.problem.held) == 9
+    assert not outcome.converged and outcome.stop_reason == "9 vertices of folded faces are held"
 
 
 def test_what_gliding_has_untangled_is_not_untangled_once_more(problem, monkeypatch):
@@ -204,3 +206,57 @@ def test_an_unfinished_area_map_can_be_finished():
     assert done.certificate.certified and done.converged
     assert done.distortion.element_std < start.distortion.element_std
     assert (done.mesh is start.mesh) and done.torus == start.torus
+
+
+def holding(monkeypatch, times: int) -> list[object]:
+    """Lets the first solves end with some vertices held, and lists them all."""
+    ended: list[object] = []
+    solve = certified.solve
+
+    def holds(problem, options, **keywords):
+        found = solve(problem, options, **keywords)
+        if len(ended) < times:
+            held = problem.solid.boundary_vertices[:3].astype(np.intp)
+            kept = dataclasses.replace(found.problem, held=held)
+            found = dataclasses.replace(found, problem=kept)
+        ended.append(found)
+        return found
+
+    monkeypatch.setattr(certified, "solve", holds)
+    return ended
+
+
+def test_where_vertices_stay_held_another_start_is_tried(monkeypatch):
+    ended = holding(monkeypatch, 1)
+    result = sm.volume_map(SOLID)
+    assert len(ended) == 2 and result.history == ended[1].history
+    assert result.certificate.certified and result.seconds["other starts"] > 0.0
+
+
+def test_if_all_starts_hold_some_the_lowest_energy_counts(monkeypatch):
+    ended = holding(monkeypatch, 9)
+    result = sm.volume_map(SOLID)
+    assert len(ended) > 1
+
+    def energy(history):
+        return [record.energy for record in history if record.stage == "glide"][-1]
+
+    assert energy(result.history) == min(energy(outcome.history) for outcome in ended)
+
+
+@pytest.mark.parametrize(("share", "unfolded"), [(1e-3, True), (5e-2, False)])
+def test_a_boundary_with_too_many_folded_faces_is_not_unfolded(monkeypatch, share, unfolded):
+    plain = sm.area_map(SOLID.surface, finish="none", ratio="search")
+    ids = {"boundary_graph": tuple(range(int(share * len(SOLID.surface.F)) + 1))}
+    certificate = dataclasses.replace(plain.certificate, certified=False, ids=ids)
+    folded = dataclasses.replace(plain, certificate=certificate)
+    turned = []
+
+    def finished(start, **_):
+        turned.append(start)
+        return plain
+
+    monkeypatch.setattr(boundary_starts_module, "along", lambda *_: folded)
+    monkeypatch.setattr(boundary_starts_module, "finished", finished)
+    next(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
+    assert bool(turned) == unfolded

@@ -97,7 +97,7 @@ def test_one_that_is_as_dear_as_all_there_is_is_not_waited_for(monkeypatch, plai
 
 
 def test_patience_is_for_the_proven_and_for_the_measured(monkeypatch, plain):
-    folded = SimpleNamespace(certified=False)
+    folded = SimpleNamespace(certified=False, ids={})
     bad, poor = twisted(plain, 3.0), dataclasses.replace(plain, certificate=folded)
 
     def patience(maps):
@@ -164,7 +164,7 @@ def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch, plain):
     def chart(least):
         def made(_, ratio, shape=0.0):
             kept = SimpleNamespace(ratios=np.array([1.0, least]))
-            certified = SimpleNamespace(certified=shape != 10.0)
+            certified = SimpleNamespace(certified=shape != 10.0, ids={})
             return SimpleNamespace(ratio=ratio, shape=shape, certificate=certified, distortion=kept)
 
         return made
@@ -182,7 +182,7 @@ def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch):
 
     def chart(_, ratio, shape=0.0):
         tried.append((round(ratio / 1.5, 9), shape))
-        certified = SimpleNamespace(certified=ratio > 3.0)
+        certified = SimpleNamespace(certified=ratio > 3.0, ids={})
         kept = SimpleNamespace(ratios=np.ones(1))
         return SimpleNamespace(ratio=ratio, certificate=certified, distortion=kept)
 

@@ -252,7 +252,8 @@ def test_a_boundary_map_is_no_map_of_all_where_no_vertex_is_inside():
     assert len(solid.boundary_vertices) == solid.n_vertices
     start = sm.area_map(solid.surface, ratio=1.5, keep_best=True)
     result = sm.volume_map(solid, start=start)
-    assert result.converged and "frozen" in {record.stage for record in result.history}
+    assert result.converged or "are held" in result.stop_reason
+    assert "frozen" in {record.stage for record in result.history}
     assert result.distortion.element_std < 0.2
     again = sm.volume_map(result.mesh, start=result)
     assert "frozen" not in {record.stage for record in again.history}

@@ -48,9 +48,9 @@ struct LevelMatrix {
   void set_pattern(Index rows, const Index* row_start, const Index* columns,
                    const std::vector<Index>& order);
   // From now on with the `given` values of the pattern's entries in its own order, row-major
-  // blocks, which have to outlive this, times `factor`. Returns the rows (at most 20) whose
-  // diagonal block is not positive definite; such a block is replaced by one with the absolute
-  // values of its eigenvalues.
+  // blocks, times `factor`; they have to stay until the transfer to the next level has its numbers.
+  // Returns the rows (at most 20) whose diagonal block is not positive definite; such a block is
+  // replaced by one with the absolute values of its eigenvalues.
   std::vector<Index> set_values(const double* given, double factor = 1.0);
   // The block of entry e, row-major.
   std::array<double, B * B> block(Index e) const {
