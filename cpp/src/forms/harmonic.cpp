@@ -6,6 +6,7 @@
 
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::forms {
 namespace {
@@ -82,7 +83,7 @@ HarmonicSolution harmonic_forms(Index n_vertices, const EdgesRef& edges, const V
     result.forms.col(e) +=
         (result.potentials.row(edges(e, 1)) - result.potentials.row(edges(e, 0))).transpose();
   }
-  result.gram = result.forms * weights.asDiagonal() * result.forms.transpose();
+  result.gram = linalg::weighted_gram(result.forms, weights);
   return result;
 }
 

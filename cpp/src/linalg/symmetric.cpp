@@ -46,4 +46,8 @@ Eigen::MatrixXd map_eigenvalues(const DenseRef& A, const std::function<double(do
   return eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
+Rows weighted_gram(const Rows& A, const VecRef& weights) {
+  return A * weights.asDiagonal() * A.transpose();
+}
+
 }  // namespace stretchmap::linalg

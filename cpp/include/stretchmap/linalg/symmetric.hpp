@@ -6,6 +6,8 @@
 #include <cmath>
 #include <functional>
 
+#include "stretchmap/base/types.hpp"
+
 namespace stretchmap::linalg {
 
 using DenseRef = Eigen::Ref<const Eigen::MatrixXd>;
@@ -36,5 +38,8 @@ bool invert_positive(const DenseRef& A, Eigen::Ref<Eigen::MatrixXd> inverse);
 // \return V f(Lambda) V' for A = V Lambda V'.
 Eigen::MatrixXd map_eigenvalues(const DenseRef& A,
                                 const std::function<double(double value, double largest)>& f);
+
+// \return A W A' for the diagonal matrix W of the weights.
+Rows weighted_gram(const Rows& A, const VecRef& weights);
 
 }  // namespace stretchmap::linalg
