@@ -31,7 +31,7 @@ _GENTLE = SHAPES[2:]  # lighter ones leave folds, which opened become needles
 _LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a limb
 _LESS_FAT = (1.6, 2.5)  # times that ratio, where coarse triangles fold
 _LOST = 1e-16  # of its area a face has no more
-# Share of the faces that do not look outward from which on turning them has not been seen to succeed
+# Share of the faces that do not look outward from which on turning them was not seen to succeed
 # (from 0.041 on it failed, up to 0.025 it did not), and takes as long as all that follows may.
 _TOO_MANY = 0.03
 
