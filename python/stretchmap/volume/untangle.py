@@ -30,9 +30,9 @@ _WIDEST = 1.0  # epsilon: determinants are 1 where all is well, a larger one tel
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
-# few tets are left and whole steps follow with ease. Faces that glide are not hurried: single ones
-# stay folded then.
-_SLOW, _SWIFT = 0.9, 0.8
+# a few tets are left after some settled steps and whole ones follow with ease. Faces that glide are
+# not hurried: single ones stay folded then.
+_SLOW, _SWIFT, _DRAGS = 0.9, 0.7, 2
 _BETTER = 1.05
 _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to the floor
 _FEW, _FEW_SHARE = 30, 0.002  # inverted elements that are better worked on in patches
@@ -112,7 +112,8 @@ def _continue(
         if (left, -worst) <= (best.left, -best.worst):
             best = Untangled(x, int(left), worst)
         if settled:
-            swift = left <= _FEW and step.alpha >= 1.0 and not face
+            drags = left <= _FEW and patience.since >= _DRAGS and not face
+            swift = drags and step.alpha >= 1.0
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
 
