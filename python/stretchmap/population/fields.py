@@ -16,6 +16,7 @@ from ..errors import ArrayError, MissingDependencyError, OptionError
 from ..maps.files import LoadedMap
 from ..mesh.meshes import TetMesh
 from ..resample.fields import transfer
+from ..volume.fill import fill
 from .result import Population
 
 __all__ = ["FieldStatistics", "carry_field", "field_statistics"]
@@ -96,6 +97,8 @@ def carry_field(
         There is no such shape, or an option out of range.
     ArrayError, NonFiniteError, DegenerateError
         As `transfer`.
+    CertificationError
+        The mean is too coarse for the shape, and its refinement could not be laid on it.
 
     Examples
     --------
@@ -115,15 +118,32 @@ def carry_field(
     if name not in places:
         raise OptionError(f"where the shape {name!r} came from is not known; take a result of fit")
     solid = places[name].load()
-    laid = TetMesh(population.correspondences[population.names.index(name)], population.mean.T)
+    laid, parent = _laid(population, name)
     between = LoadedMap(
         mesh=solid, image=solid.V, target=laid, arrays={}, meta={}, converged=True,
         stop_reason="the shape itself", seconds={},
     )  # fmt: skip
-    if conserve == "value":
-        return transfer(between, values, per=per, conserve="mean")
-    carried = transfer(between, values, per=per, conserve="integral")
-    return np.asarray(carried * (laid.tet_volumes / population.mean.tet_volumes))
+    carried = transfer(
+        between, values, per=per, conserve="mean" if conserve == "value" else "integral"
+    )
+    mean = population.mean
+    there = laid.tet_volumes
+    if parent is not None:  # of the parts of each tet
+        parts, there = carried * there, np.bincount(parent, there).astype(np.float64)
+        carried = np.bincount(parent, parts) / there
+    return carried if conserve == "value" else np.asarray(carried * (there / mean.tet_volumes))
+
+
+def _laid(population: Population, name: str) -> tuple[TetMesh, NDArray[np.int32] | None]:
+    """The mean laid on a shape, refined if that took more tets than it has, and which of its tets
+    each lies in."""
+    mean, points = population.mean, population.correspondences[population.names.index(name)]
+    laid = TetMesh(points, mean.T)
+    if (laid.tet_volumes > 0.0).all():
+        return laid, None
+    found = fill(mean, points[mean.boundary_vertices])
+    parent = None if found.refinement is None else found.refinement.parent_tet
+    return TetMesh(found.image, found.mesh.T), parent
 
 
 def field_statistics(

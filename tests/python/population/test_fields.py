@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,25 @@ def test_integrals_are_conserved(bones, found):
         carried = sm.population.carry_field(found, name, values)
         wanted = (solid.tet_volumes * values[solid.T].mean(axis=1)).sum()
         assert carried @ found.mean.tet_volumes == pytest.approx(wanted, rel=1e-12)
+
+
+def test_a_mean_too_coarse_for_a_shape_is_refined_there(bones, found):
+    """The template was mapped with more tets than it has; with its own, some turn over."""
+    name, solid = found.names[2], bones.solids[2]
+    points = found.correspondences.copy()
+    mean = found.mean
+    inner = np.setdiff1d(np.arange(mean.n_vertices), mean.boundary_vertices)
+    beside = np.setdiff1d(mean.T[(mean.T == inner[0]).any(axis=1)], inner[:1])
+    points[2, inner[0]] = 4.0 * points[2, beside].mean(axis=0) - 3.0 * points[2, inner[0]] + 5.0
+    turned = dataclasses.replace(found, correspondences=points)
+    assert (sm.TetMesh(points[2], mean.T).tet_volumes <= 0.0).any()
+    values = fields(bones, found)[name]
+    wanted = (solid.tet_volumes * values[solid.T].mean(axis=1)).sum()
+    mass = sm.population.carry_field(turned, name, values)
+    assert mass @ mean.tet_volumes == pytest.approx(wanted, rel=1e-12)
+    there = sm.population.carry_field(turned, name, values, conserve="value")
+    plain = sm.population.carry_field(found, name, values, conserve="value")
+    assert np.median(np.abs(there - plain)) < 0.02 and np.abs(there - plain).max() < 0.3
 
 
 def test_values_are_carried_to_where_they_belong(bones, found):
