@@ -72,28 +72,47 @@ def test_a_needle_mesh_has_no_slivers(problem):
     assert (stretched.roomy_volumes == stretched.local_volumes).all()
 
 
-def failing(monkeypatch, times: int) -> list[np.ndarray]:
-    """Lets the first solves end with inverted tets, and lists the images all began with."""
-    tried: list[np.ndarray] = []
+def spoiling(monkeypatch, times: int, spoilt) -> list[tuple[object, object]]:
+    """Spoils what the first solves end with, and lists all problems with their outcomes."""
+    solved: list[tuple[object, object]] = []
     solve = certified.solve
 
-    def fails(problem, options, **keywords):
-        tried.append(problem.x.copy())
+    def spoils(problem, options, **keywords):
         found = solve(problem, options, **keywords)
-        if len(tried) <= times:
-            x = found.problem.x.copy()
-            x[np.setdiff1d(np.arange(len(x)), problem.solid.boundary_vertices)] *= -1.0
-            return dataclasses.replace(found, problem=dataclasses.replace(found.problem, x=x))
+        if len(solved) < times:
+            found = dataclasses.replace(found, problem=spoilt(found.problem))
+        solved.append((problem, found))
         return found
 
-    monkeypatch.setattr(certified, "solve", fails)
-    return tried
+    monkeypatch.setattr(certified, "solve", spoils)
+    return solved
+
+
+def failing(monkeypatch, times: int) -> list[tuple[object, object]]:
+    """Lets the first solves end with inverted tets."""
+
+    def inverted(problem):
+        x = problem.x.copy()
+        x[np.setdiff1d(np.arange(len(x)), problem.solid.boundary_vertices)] *= -1.0
+        return dataclasses.replace(problem, x=x)
+
+    return spoiling(monkeypatch, times, inverted)
+
+
+def holding(monkeypatch, times: int) -> list[tuple[object, object]]:
+    """Lets the first solves end with some vertices held."""
+
+    def held(problem):
+        some = problem.solid.boundary_vertices[:3].astype(np.intp)
+        return dataclasses.replace(problem, held=some)
+
+    return spoiling(monkeypatch, times, held)
 
 
 def test_another_start_is_tried_where_one_fails(monkeypatch):
     tried = failing(monkeypatch, 1)
     result = sm.volume_map(SOLID)
-    assert len(tried) == 2 and (tried[0] != tried[1]).any()
+    assert len(tried) == 2 and (tried[0][0].x != tried[1][0].x).any()
     assert result.certificate.certified and result.distortion.flips == 0
     assert result.seconds["other starts"] > 0.0
 
@@ -208,28 +227,10 @@ def test_an_unfinished_area_map_can_be_finished():
     assert (done.mesh is start.mesh) and done.torus == start.torus
 
 
-def holding(monkeypatch, times: int) -> list[object]:
-    """Lets the first solves end with some vertices held, and lists them all."""
-    ended: list[object] = []
-    solve = certified.solve
-
-    def holds(problem, options, **keywords):
-        found = solve(problem, options, **keywords)
-        if len(ended) < times:
-            held = problem.solid.boundary_vertices[:3].astype(np.intp)
-            kept = dataclasses.replace(found.problem, held=held)
-            found = dataclasses.replace(found, problem=kept)
-        ended.append(found)
-        return found
-
-    monkeypatch.setattr(certified, "solve", holds)
-    return ended
-
-
 def test_where_vertices_stay_held_another_start_is_tried(monkeypatch):
     ended = holding(monkeypatch, 1)
     result = sm.volume_map(SOLID)
-    assert len(ended) == 2 and result.history == ended[1].history
+    assert len(ended) == 2 and result.history == ended[1][1].history
     assert result.certificate.certified and result.seconds["other starts"] > 0.0
 
 
@@ -241,7 +242,7 @@ def test_if_all_starts_hold_some_the_lowest_energy_counts(monkeypatch):
     def energy(history):
         return [record.energy for record in history if record.stage == "glide"][-1]
 
-    assert energy(result.history) == min(energy(outcome.history) for outcome in ended)
+    assert energy(result.history) == min(energy(outcome.history) for _, outcome in ended)
 
 
 @pytest.mark.parametrize(("share", "unfolded"), [(1e-3, True), (5e-2, False)])
