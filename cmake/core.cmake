@@ -2,7 +2,8 @@
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS cpp/src/*.cpp)
 add_library(stretchmap_core STATIC ${core_sources})
 target_include_directories(stretchmap_core PUBLIC cpp/include PRIVATE cpp/src)
-target_link_libraries(stretchmap_core PUBLIC Eigen3::Eigen)
+find_package(Threads REQUIRED)
+target_link_libraries(stretchmap_core PUBLIC Eigen3::Eigen Threads::Threads)
 target_compile_definitions(stretchmap_core PUBLIC EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
 target_precompile_headers(stretchmap_core PRIVATE <stretchmap/base/types.hpp> <string> <vector>)
 
@@ -12,7 +13,6 @@ else()
   set(x86 OFF)
 endif()
 if(MSVC)
-  # Loops over 32-bit signed indices and nothing newer than OpenMP 2.0 are all that is asked of it.
   # Templates make more sections than an object file has by default.
   set(warnings /W3)
   target_compile_options(stretchmap_core PRIVATE ${warnings} /bigobj /utf-8)
@@ -57,15 +57,6 @@ foreach(source IN LISTS core_sources)
   string(REPLACE "/" "_" folder "${folder}")
   set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder})
 endforeach()
-
-if(STRETCHMAP_OPENMP)
-  find_package(OpenMP COMPONENTS CXX)
-endif()
-if(OpenMP_CXX_FOUND)
-  target_link_libraries(stretchmap_core PUBLIC OpenMP::OpenMP_CXX)
-elseif(NOT MSVC)
-  target_compile_options(stretchmap_core PUBLIC -Wno-unknown-pragmas)
-endif()
 
 if(STRETCHMAP_SANITIZE)
   target_compile_definitions(stretchmap_core PUBLIC _GLIBCXX_ASSERTIONS)

@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "stretchmap/base/parallel.hpp"
+
 #if defined(__unix__) || defined(__APPLE__)
 #include <sys/resource.h>
 #endif
@@ -82,20 +84,14 @@ double peak_resident_bytes() {
 }
 
 Record copy_bandwidth(int threads) {
-  const long n = 1L << 24;  // 128 MiB per array
+  const Index n = 1 << 24;  // 128 MiB per array
   const std::unique_ptr<double[]> from(new double[n]), to(new double[n]);
-#pragma omp parallel for schedule(static)
-  for (long i = 0; i < n; ++i) {
+  for_rows(n, [&](Index i) {
     from[i] = static_cast<double>(i);
     to[i] = 0.0;
-  }
+  });
   Record record = measure(
-      "bandwidth/copy",
-      [&] {
-#pragma omp parallel for schedule(static)
-        for (long i = 0; i < n; ++i) to[i] = from[i];
-      },
-      1.0, 15);
+      "bandwidth/copy", [&] { for_rows(n, [&](Index i) { to[i] = from[i]; }); }, 1.0, 15);
   record.threads = threads;
   const double bytes = 2.0 * sizeof(double) * static_cast<double>(n);
   record.counters = {{"bytes_per_second", bytes / record.seconds}, {"check", to[n - 1] - (n - 1)}};

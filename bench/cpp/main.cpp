@@ -8,13 +8,7 @@
 
 #include "stages.hpp"
 #include "stretchmap/base/errors.hpp"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-#if defined(__unix__) || defined(__APPLE__)
-#include <unistd.h>
-#endif
+#include "stretchmap/base/threads.hpp"
 
 namespace stretchmap::bench {
 
@@ -103,22 +97,6 @@ Arguments parse(int argc, char** argv) {
   return a;
 }
 
-// Threads that spin while they wait cost several times the work itself as soon as the machine has
-// anything else to do. The OpenMP run-time reads its environment before main, hence the new start.
-void sleep_while_waiting([[maybe_unused]] char** argv) {
-#if defined(__unix__) || defined(__APPLE__)
-  if (std::getenv("OMP_WAIT_POLICY") != nullptr) return;
-  setenv("OMP_WAIT_POLICY", "passive", 1);
-  execvp(argv[0], argv);  // returns only if it fails; then the threads spin
-#endif
-}
-
-void set_threads([[maybe_unused]] int threads) {
-#ifdef _OPENMP
-  omp_set_num_threads(threads);
-#endif
-}
-
 void run(Arguments& a) {
   std::vector<Record> records;
   const auto report = [&](Record record) {
@@ -129,7 +107,7 @@ void run(Arguments& a) {
   print_header();
   for (const long threads : a.threads) {
     a.settings.threads = static_cast<int>(threads);
-    set_threads(a.settings.threads);
+    set_thread_count(a.settings.threads);
     Record probe = copy_bandwidth(a.settings.threads);
     probe.name += "/threads:" + std::to_string(threads);
     a.settings.bandwidth = probe.counters.front().second;
@@ -155,7 +133,6 @@ void run(Arguments& a) {
 
 int main(int argc, char** argv) {
   using namespace stretchmap::bench;
-  sleep_while_waiting(argv);
   Arguments arguments;
   try {
     arguments = parse(argc, argv);

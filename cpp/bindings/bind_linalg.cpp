@@ -1,5 +1,6 @@
 #include "arrays.hpp"
 #include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::linalg {
 namespace {
@@ -45,6 +46,13 @@ void bind(py::module_& m) {
           py::arg("B").noconvert(), py::arg("X"), py::arg("tol") = 1e-10, py::arg("max_iter") = 500,
           py::arg("must_converge") = true, release_gil())
       .def_property_readonly("backend", &SpdSolver::backend);
+  m.def(
+      "normal_matrix",
+      [](const RowsRef& A, const VecRef& weights) {
+        if (A.rows() != weights.size()) throw Error("SolverError", "a weight for every row");
+        return normal_matrix(A, weights);
+      },
+      py::arg("A").noconvert(), py::arg("weights").noconvert(), release_gil());
 }
 
 }  // namespace stretchmap::linalg

@@ -8,26 +8,6 @@ from typing import TYPE_CHECKING
 
 from ._version import __version__ as __version__
 
-
-def _load_core() -> None:
-    """Load the C++ core with OpenMP threads that sleep while they wait.
-
-    The OpenMP runtime reads its policy once, when it is loaded, and by default its threads spin:
-    on a machine that has other work to do that costs several times the run time. A policy set by
-    the user stands, and the environment is left as it was.
-    """
-    if "OMP_WAIT_POLICY" in os.environ:
-        importlib.import_module(f"{__name__}._core")
-        return
-    os.environ["OMP_WAIT_POLICY"] = "passive"
-    try:
-        importlib.import_module(f"{__name__}._core")
-    finally:
-        del os.environ["OMP_WAIT_POLICY"]
-
-
-_load_core()
-
 if hasattr(os, "register_at_fork"):
     # A forked process computes with one thread: those of its parent are not there any more.
     _base = importlib.import_module(f"{__name__}._core").base

@@ -6,6 +6,7 @@
 #include "area/cross.hpp"
 #include "stretchmap/area/line_roots.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::area {
@@ -89,12 +90,11 @@ double equal_area_angle(double s, double tube_ratio, double guess) {
 
 Vec angle_from_equal_area(const VecRef& s, double tube_ratio) {
   Vec v(s.size());
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < static_cast<Index>(s.size()); ++i) {
+  for_rows(static_cast<Index>(s.size()), kElementChunk, [&](Index i) {
     const double whole = kTwoPi * std::round(s(i) / kTwoPi);
     const double t = s(i) - whole;
     v(i) = equal_area_angle(t, tube_ratio, t / (1.0 + tube_ratio)) + whole;
-  }
+  });
   return v;
 }
 

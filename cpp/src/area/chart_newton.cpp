@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/linalg/backtrack.hpp"
 
 namespace stretchmap::area {
@@ -65,9 +66,9 @@ Matrix2d ChartNewton::jacobian(const Points2& turns, const Targets& targets, Ind
 double ChartNewton::value(const Points2& turns, const TriangleWeights& weights,
                           const Targets& targets) const {
   Vec values(targets.areas.size());
-#pragma omp parallel for schedule(static)
-  for (Index f = 0; f < static_cast<Index>(values.size()); ++f)
+  for_rows(static_cast<Index>(values.size()), kElementChunk, [&](Index f) {
     values(f) = targets.weights(f) * triangle_value(jacobian(turns, targets, f), weights);
+  });
   return values.sum();
 }
 
@@ -78,8 +79,7 @@ ChartStep ChartNewton::step(const TriangleWeights& weights, double reach, const 
   for (Index f = 0; f < m; ++f)
     if (std::abs(goal.areas(f) - 1.0) < 1e-9) result.within += reference_.areas(f);
   Rows gradients(m, 6), hessians(m, 36);
-#pragma omp parallel for schedule(static)
-  for (Index f = 0; f < m; ++f) {
+  for_rows(m, kElementChunk, [&](Index f) {
     Matrix2d stress;
     Matrix4 curvature;
     triangle_model(jacobian(turns_, goal, f), stress, curvature, weights);
@@ -93,7 +93,7 @@ ChartStep ChartNewton::step(const TriangleWeights& weights, double reach, const 
     gradients.row(f) = goal.weights(f) * flat.transpose() * D;
     Eigen::Map<Eigen::Matrix<double, 6, 6>>(hessians.row(f).data()) =
         goal.weights(f) * D.transpose() * curvature * D;
-  }
+  });
   const Vec gradient = sum_corners(chart_.faces, chart_.n_vertices, gradients);
   const Vec solution = system_.solve(hessians, gradient, poll);
   Points2 direction = Eigen::Map<const Points2>(solution.data(), chart_.n_vertices, 2);

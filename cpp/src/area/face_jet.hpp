@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::area {
@@ -20,8 +21,7 @@ struct Jet {
 inline std::vector<TorusPoint> torus_points(const Torus& torus, const Points2Ref& angles) {
   const Index n = static_cast<Index>(angles.rows());
   std::vector<TorusPoint> points(static_cast<std::size_t>(n));
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i) points[i] = torus.jet(angles(i, 0), angles(i, 1));
+  for_rows(n, [&](Index i) { points[i] = torus.jet(angles(i, 0), angles(i, 1)); });
   return points;
 }
 

@@ -7,6 +7,7 @@
 #include "area/face_jet.hpp"
 #include "area/facing.hpp"
 #include "stretchmap/area/surface_pattern.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::area {
@@ -184,15 +185,14 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
   Rows gradients(second ? m : 0, 6);
   GlideEnergy energy;
   if (second) energy.hessians.resize(m, 36);
-#pragma omp parallel for schedule(static)
-  for (Index f = 0; f < m; ++f) {
+  for_rows(m, kCostlyChunk, [&](Index f) {
     Jet jet = face_energy(problem, weights, scale, points, angles, f, derivatives);
     values(f) = jet.value;
-    if (!second) continue;
+    if (!second) return;
     gradients.row(f) = jet.gradient;
     if (derivatives == Derivatives::kModel) make_convex(jet.hessian);
     Eigen::Map<SixSix>(energy.hessians.row(f).data()) = jet.hessian;
-  }
+  });
   energy.value = values.sum();
   if (second)
     energy.gradient = sum_corners(problem.chart.faces, problem.chart.n_vertices, gradients);

@@ -7,6 +7,7 @@
 
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/torus.hpp"
 #include "stretchmap/mesh/rounded_triangle.hpp"
 
@@ -109,8 +110,7 @@ std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
   const Eigen::ArrayXd u = kTwoPi * turns.col(0).array();
   const Eigen::ArrayXd cos_u = u.cos(), sin_u = u.sin();
   std::vector<SurfaceQuality> result(static_cast<std::size_t>(candidates.rows()));
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < static_cast<Index>(candidates.rows()); ++i) {
+  for_tasks(static_cast<Index>(candidates.rows()), [&](Index i) {
     const TubeTable& table = tables.at(candidates(i, 1));
     Points image(turns.rows(), 3);
     for (Index k = 0; k < static_cast<Index>(turns.rows()); ++k) {
@@ -119,7 +119,7 @@ std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
       image.row(k) << axis * cos_u(k), axis * sin_u(k), tube.y();
     }
     result[i] = surface_quality(reference, faces, image);
-  }
+  });
   return result;
 }
 

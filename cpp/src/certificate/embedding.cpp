@@ -5,6 +5,7 @@
 #include <numeric>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/predicates.hpp"
 
 namespace stretchmap::certificate {
@@ -127,11 +128,10 @@ class BoxTree {
 
 IndexVec not_positive_tets(const PointsRef& points, const TetsRef& tets) {
   std::vector<char> bad(tets.rows());
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index t = 0; t < tets.rows(); ++t) {
+  for_rows(static_cast<Index>(tets.rows()), kElementChunk, [&](Index t) {
     const auto corner = [&](int k) -> Point { return points.row(tets(t, k)); };
     bad[t] = orient3d(corner(0), corner(1), corner(2), corner(3)) <= 0;
-  }
+  });
   IndexVec ids(std::count(bad.begin(), bad.end(), 1));
   Index count = 0;
   for (std::size_t t = 0; t < bad.size(); ++t) {

@@ -4,6 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::maps {
 namespace {
 
@@ -147,14 +149,13 @@ SurfaceFeet SurfaceTree::feet(const PointsRef& queries, const Poll& poll) const 
   constexpr Index kBetweenPolls = 1 << 16;
   for (Index first = 0; first < n; first += kBetweenPolls) {
     if (poll) poll();
-    const Index last = std::min(n, first + kBetweenPolls);
-#pragma omp parallel for schedule(static)
-    for (Index i = first; i < last; ++i) {
+    for_rows(std::min(kBetweenPolls, n - first), kCostlyChunk, [&](Index row) {
+      const Index i = first + row;
       const Foot foot = closest(queries.row(i).transpose());
       out.points.row(i) = foot.point.transpose();
       out.face[i] = foot.face;
       out.weights.row(i) = foot.weights.transpose();
-    }
+    });
   }
   return out;
 }

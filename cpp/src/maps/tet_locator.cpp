@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::maps {
 namespace {
 
@@ -100,9 +102,8 @@ TetLocation TetLocator::locate(const PointsRef& queries, const Poll& poll) const
   TetLocation found{IndexVec(n), Rows(n, 4)};
   for (Index begin = 0; begin < n; begin += kBatch) {
     if (poll) poll();
-    const Index end = std::min(n, begin + kBatch);
-#pragma omp parallel for schedule(static)
-    for (Index i = begin; i < end; ++i) {
+    for_rows(std::min(kBatch, n - begin), kCostlyChunk, [&](Index row) {
+      const Index i = begin + row;
       const Eigen::Vector3d p = queries.row(i).transpose();
       Best best;
       // The comparison fails for a NaN, too.
@@ -117,7 +118,7 @@ TetLocation TetLocator::locate(const PointsRef& queries, const Poll& poll) const
         found.weights.row(i) = best.weights.transpose();
       else
         found.weights.row(i).setConstant(std::numeric_limits<double>::quiet_NaN());
-    }
+    });
   }
   return found;
 }

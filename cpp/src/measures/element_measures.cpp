@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::measures {
 namespace {
 
@@ -28,15 +30,15 @@ ElementMeasures face_measures(const PointsRef& points, const FacesRef& faces,
                               const PointsRef& image, const VecRef& sign) {
   const Eigen::Index m = faces.rows();
   ElementMeasures out{Vec(m), Vec(m), Vec(m), Vec(m)};
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index f = 0; f < m; ++f) {
+  for_rows(static_cast<Index>(m), kElementChunk, [&](Index f) {
     const auto edge = [&](const PointsRef& x, int k) -> Vec3 {
       return x.row(faces(f, k)) - x.row(faces(f, 0));
     };
     const FlatTriangle s = lay_flat(edge(points, 1), edge(points, 2));
     const FlatTriangle t = lay_flat(edge(image, 1), edge(image, 2));
-    // The affine map is upper triangular in these frames. Its parts that turn and that mirror have
-    // the norms (s1 + s2) / 2 and (s1 - s2) / 2, without the cancellation of the Gram matrix.
+    // The affine map is upper triangular in these frames. Its parts that turn and that mirror
+    // have the norms (s1 + s2) / 2 and (s1 - s2) / 2, without the cancellation of the Gram
+    // matrix.
     const double j11 = t.x1 / s.x1;
     const double j12 = (t.x2 - j11 * s.x2) / s.y2;
     const double j22 = sign[f] * t.y2 / s.y2;
@@ -46,15 +48,14 @@ ElementMeasures face_measures(const PointsRef& points, const FacesRef& faces,
     out.image[f] = sign[f] * t.area;
     out.angle[f] = out.image[f] > 0.0 ? (turn + mirror) / (turn - mirror) : kInfinity;
     out.conformal[f] = 2.0 * s.area * mirror * mirror;
-  }
+  });
   return out;
 }
 
 ElementMeasures tet_measures(const PointsRef& points, const TetsRef& tets, const PointsRef& image) {
   const Eigen::Index m = tets.rows();
   ElementMeasures out{Vec(m), Vec(m), Vec(m), Vec()};
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index t = 0; t < m; ++t) {
+  for_rows(static_cast<Index>(m), kElementChunk, [&](Index t) {
     const auto edge = [&](const PointsRef& x, int k) -> Vec3 {
       return x.row(tets(t, k)) - x.row(tets(t, 0));
     };
@@ -69,7 +70,7 @@ ElementMeasures tet_measures(const PointsRef& points, const TetsRef& tets, const
     const double det = det_image / det_source;
     const double root = std::cbrt(det);
     out.angle[t] = det > 0.0 ? jacobian.squaredNorm() / (3.0 * root * root) : kInfinity;
-  }
+  });
   return out;
 }
 

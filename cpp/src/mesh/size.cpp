@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::mesh {
 namespace {
 
@@ -51,14 +53,13 @@ Vec face_areas(const PointsRef& points, const FacesRef& faces) {
 Vec tet_volumes(const PointsRef& points, const TetsRef& tets) {
   const Index k = static_cast<Index>(tets.rows());
   Vec volumes(k);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
+  for_rows(k, [&](Index t) {
     const Eigen::RowVector3d a = points.row(tets(t, 0));
     const Eigen::RowVector3d b = points.row(tets(t, 1)) - a;
     const Eigen::RowVector3d c = points.row(tets(t, 2)) - a;
     const Eigen::RowVector3d d = points.row(tets(t, 3)) - a;
     volumes[t] = b.dot(c.cross(d)) / 6.0;
-  }
+  });
   return volumes;
 }
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::registration {
 namespace {
 
@@ -69,12 +71,11 @@ ChartLocator::Hit ChartLocator::find(const Eigen::Vector2d& q) const {
 FaceLocation ChartLocator::locate(const Points2Ref& queries) const {
   const Index n = static_cast<Index>(queries.rows());
   FaceLocation found{IndexVec(n), Points(n, 3)};
-#pragma omp parallel for schedule(static) if (n > 1000)
-  for (Index i = 0; i < n; ++i) {
+  for_rows(n, kCostlyChunk, [&](Index i) {
     const Hit hit = find(queries.row(i).transpose());
     found.face[i] = hit.face;
     found.weights.row(i) = hit.weights.transpose();
-  }
+  });
   return found;
 }
 

@@ -104,33 +104,30 @@ FitSamples BoundaryFit::match(const PointsRef& x) const {
 void BoundaryFit::match_quads(const PointsRef& x, FitSamples& out) const {
   const Index n = static_cast<Index>(quads_.rows()), per = per_side_ * per_side_;
   const double step = 1.0 / (per_side_ - 1);
-  for_chunks(
-      n,
-      [&](Index begin, Index end) {
-        for (Index b = begin; b < end; ++b) {
-          const RowVector3d d1 = x.row(quads_(b, 2)) - x.row(quads_(b, 0)),
-                            d2 = x.row(quads_(b, 3)) - x.row(quads_(b, 1));
-          const double area = 0.5 * d1.cross(d2).norm();
-          Index hint = 0;
-          for (Index k = 0; k < per; ++k) {
-            const double s = (k % per_side_) * step, t = (k / per_side_) * step;
-            const RowVector4d w((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t);
-            Vector3d here = Vector3d::Zero();
-            for (int c = 0; c < 4; ++c) here += w[c] * x.row(quads_(b, c)).transpose();
-            const maps::Foot foot = surface_.closest(here, hint);
-            hint = foot.face;
-            const Index j = per * b + k;
-            out.corners.row(j) = quads_.row(b);
-            out.weights.row(j) = w;
-            out.point.row(j) = foot.point.transpose();
-            out.normal.row(j) =
-                direction(normal(foot.face, foot.weights), here.transpose() - out.point.row(j));
-            out.distance[j] = std::sqrt(foot.squared_distance);
-            out.share[j] = area / per;
-          }
-        }
-      },
-      kSamplesPerChunk / per + 1);
+  for_chunks(n, kSamplesPerChunk / per + 1, [&](Index begin, Index end) {
+    for (Index b = begin; b < end; ++b) {
+      const RowVector3d d1 = x.row(quads_(b, 2)) - x.row(quads_(b, 0)),
+                        d2 = x.row(quads_(b, 3)) - x.row(quads_(b, 1));
+      const double area = 0.5 * d1.cross(d2).norm();
+      Index hint = 0;
+      for (Index k = 0; k < per; ++k) {
+        const double s = (k % per_side_) * step, t = (k / per_side_) * step;
+        const RowVector4d w((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t);
+        Vector3d here = Vector3d::Zero();
+        for (int c = 0; c < 4; ++c) here += w[c] * x.row(quads_(b, c)).transpose();
+        const maps::Foot foot = surface_.closest(here, hint);
+        hint = foot.face;
+        const Index j = per * b + k;
+        out.corners.row(j) = quads_.row(b);
+        out.weights.row(j) = w;
+        out.point.row(j) = foot.point.transpose();
+        out.normal.row(j) =
+            direction(normal(foot.face, foot.weights), here.transpose() - out.point.row(j));
+        out.distance[j] = std::sqrt(foot.squared_distance);
+        out.share[j] = area / per;
+      }
+    }
+  });
   const Index q = out.first_of_surface;
   out.share.head(q) /= out.share.head(q).sum();
 }
@@ -149,41 +146,36 @@ void BoundaryFit::match_surface(const PointsRef& x, FitSamples& out) const {
   }
   const maps::SurfaceTree grid(points, fans);
   const Index s = static_cast<Index>(sites_.rows()), first = out.first_of_surface;
-  for_chunks(
-      s,
-      [&](Index begin, Index end) {
-        Index hint = 0;
-        for (Index i = begin; i < end; ++i) {
-          const maps::Foot foot = grid.closest(sites_.row(i).transpose(), hint);
-          hint = foot.face;
-          const Index quad = foot.face / 4, c = foot.face % 4, j = first + i;
-          RowVector4d w = RowVector4d::Constant(0.25 * foot.weights[2]);
-          w[c] += foot.weights[0];
-          w[(c + 1) % 4] += foot.weights[1];
-          RowVector3d at = foot.point.transpose(), facing;
-          if (bilinear_) {
-            std::array<RowVector3d, 4> corner;
-            for (int k = 0; k < 4; ++k) corner[k] = x.row(quads_(quad, k));
-            const PatchPoint there(corner, w, sites_.row(i));
-            w = there.weights();
-            at = there.at;
-            facing = there.facing;
-          } else {
-            const auto corner = [&](int k) -> RowVector3d {
-              return points.row(fans(foot.face, k));
-            };
-            facing = (corner(1) - corner(0)).cross(corner(2) - corner(0));
-          }
-          const RowVector3d gap = at - sites_.row(i);
-          out.corners.row(j) = quads_.row(quad);
-          out.weights.row(j) = w;
-          out.point.row(j) = sites_.row(i);
-          out.normal.row(j) = direction(site_normals_.row(i), gap);
-          out.distance[j] = gap.norm();
-          out.share[j] = facing.dot(site_normals_.row(i)) > 0.0 ? 1.0 / s : 0.0;
-        }
-      },
-      kSamplesPerChunk);
+  for_chunks(s, kSamplesPerChunk, [&](Index begin, Index end) {
+    Index hint = 0;
+    for (Index i = begin; i < end; ++i) {
+      const maps::Foot foot = grid.closest(sites_.row(i).transpose(), hint);
+      hint = foot.face;
+      const Index quad = foot.face / 4, c = foot.face % 4, j = first + i;
+      RowVector4d w = RowVector4d::Constant(0.25 * foot.weights[2]);
+      w[c] += foot.weights[0];
+      w[(c + 1) % 4] += foot.weights[1];
+      RowVector3d at = foot.point.transpose(), facing;
+      if (bilinear_) {
+        std::array<RowVector3d, 4> corner;
+        for (int k = 0; k < 4; ++k) corner[k] = x.row(quads_(quad, k));
+        const PatchPoint there(corner, w, sites_.row(i));
+        w = there.weights();
+        at = there.at;
+        facing = there.facing;
+      } else {
+        const auto corner = [&](int k) -> RowVector3d { return points.row(fans(foot.face, k)); };
+        facing = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+      }
+      const RowVector3d gap = at - sites_.row(i);
+      out.corners.row(j) = quads_.row(quad);
+      out.weights.row(j) = w;
+      out.point.row(j) = sites_.row(i);
+      out.normal.row(j) = direction(site_normals_.row(i), gap);
+      out.distance[j] = gap.norm();
+      out.share[j] = facing.dot(site_normals_.row(i)) > 0.0 ? 1.0 / s : 0.0;
+    }
+  });
 }
 
 }  // namespace stretchmap::resample

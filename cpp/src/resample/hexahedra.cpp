@@ -5,6 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::resample {
 namespace {
 
@@ -185,19 +187,17 @@ Coefficients jacobian_coefficients(const Corners& x) {
 Flags valid_hexes(const PointsRef& points, const HexesRef& hexes) {
   const Index k = static_cast<Index>(hexes.rows());
   Flags valid(k);
-#pragma omp parallel for schedule(static)
-  for (Index h = 0; h < k; ++h) {
+  for_rows(k, kElementChunk, [&](Index h) {
     const Corners x = corners_of(points, hexes, h);
     valid[h] = positive(jacobian_coefficients(x), rounding_bound(x));
-  }
+  });
   return valid;
 }
 
 Rows8 scaled_jacobians(const PointsRef& points, const HexesRef& hexes) {
   const Index k = static_cast<Index>(hexes.rows());
   Rows8 out(k, 8);
-#pragma omp parallel for schedule(static)
-  for (Index h = 0; h < k; ++h) {
+  for_rows(k, kElementChunk, [&](Index h) {
     const Corners x = corners_of(points, hexes, h);
     for (int c = 0; c < 8; ++c) {
       const Vector3d a = x[kCorners[c][1]] - x[c], b = x[kCorners[c][2]] - x[c],
@@ -205,19 +205,19 @@ Rows8 scaled_jacobians(const PointsRef& points, const HexesRef& hexes) {
       const double lengths = a.norm() * b.norm() * d.norm();
       out(h, c) = lengths > 0.0 ? det(a, b, d) / lengths : 0.0;
     }
-  }
+  });
   return out;
 }
 
 Rows24 corner_sides(const PointsRef& points, const HexesRef& hexes) {
   const Index k = static_cast<Index>(hexes.rows());
   Rows24 out(k, 24);
-#pragma omp parallel for schedule(static)
-  for (Index h = 0; h < k; ++h)
+  for_rows(k, kElementChunk, [&](Index h) {
     for (int c = 0; c < 8; ++c)
       for (int a = 0; a < 3; ++a)
         out(h, 3 * c + a) =
             (points.row(hexes(h, kCorners[c][a + 1])) - points.row(hexes(h, c))).norm();
+  });
   return out;
 }
 
@@ -225,8 +225,7 @@ Vec least_edge_jacobians(const PointsRef& points, const HexesRef& hexes) {
   const Index k = static_cast<Index>(hexes.rows());
   const auto& triples = edge_triples();
   Vec out(k);
-#pragma omp parallel for schedule(static)
-  for (Index h = 0; h < k; ++h) {
+  for_rows(k, kElementChunk, [&](Index h) {
     const Corners x = corners_of(points, hexes, h);
     out[h] = 1.0;
     for (int t = 8; t < 32; ++t) {
@@ -236,20 +235,19 @@ Vec least_edge_jacobians(const PointsRef& points, const HexesRef& hexes) {
       const double lengths = a.norm() * b.norm() * d.norm();
       out[h] = std::min(out[h], lengths > 0.0 ? det(a, b, d) / lengths : 0.0);
     }
-  }
+  });
   return out;
 }
 
 Vec hex_volumes(const PointsRef& points, const HexesRef& hexes) {
   const Index k = static_cast<Index>(hexes.rows());
   Vec out(k);
-#pragma omp parallel for schedule(static)
-  for (Index h = 0; h < k; ++h) {
+  for_rows(k, kElementChunk, [&](Index h) {
     // The mean of a polynomial is that of its Bernstein coefficients.
     double sum = 0.0;
     for (const double b : jacobian_coefficients(corners_of(points, hexes, h))) sum += b;
     out[h] = sum / 27.0;
-  }
+  });
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/mesh/rounded_triangle.hpp"
 
 namespace stretchmap::volume {
@@ -133,8 +134,8 @@ Vec least_facing(const GlidingBoundary& boundary, const PointsRef& x) {
   const GlideSites sites = sites_at(*boundary.surface, x, vertices, number, false);
   const BoundaryBarrier barrier(boundary);
   Vec facing(barrier.size());
-#pragma omp parallel for schedule(static)
-  for (Index f = 0; f < barrier.size(); ++f) facing[f] = barrier.value(x, sites, f, 1.0).facing;
+  for_rows(barrier.size(), kElementChunk,
+           [&](Index f) { facing[f] = barrier.value(x, sites, f, 1.0).facing; });
   return facing;
 }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::volume {
 
 using Eigen::Matrix2d;
@@ -25,11 +27,10 @@ GlideSites sites_at(const GlideSurface& surface, const PointsRef& x,
   const Index count = static_cast<Index>(vertices.size());
   places.resize(vertices.size(), -1);
   GlideSites sites{number, std::vector<GlideSite>(vertices.size())};
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < count; ++i) {
+  for_rows(count, kCostlyChunk, [&](Index i) {
     sites.at[i] = surface.site(x.row(vertices[i]).transpose(), places[i], derivatives);
     places[i] = sites.at[i].place;
-  }
+  });
   return sites;
 }
 

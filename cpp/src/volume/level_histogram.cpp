@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::volume {
 namespace {
 
@@ -51,13 +53,12 @@ Points2 level_histogram(const TetsRef& tets, const VecRef& values, const Points2
   const Bins bins_of(tets, values, bins, period, periodic);
   const Index k = static_cast<Index>(tets.rows()), runs = (k + kRun - 1) / kRun;
   std::vector<Points2> partial(runs);
-#pragma omp parallel for schedule(static)
-  for (Index run = 0; run < runs; ++run) {
+  for_tasks(runs, [&](Index run) {
     Points2& sums = partial[run];
     sums.setZero(bins, 2);
     for (Index t = kRun * run; t < std::min(k, kRun * (run + 1)); ++t)
       for (const Index bin : bins_of(t)) sums.row(bin) += 0.25 * amounts.row(t);
-  }
+  });
   Points2 histogram = Points2::Zero(bins, 2);
   for (const Points2& sums : partial) histogram += sums;
   return histogram;
@@ -67,9 +68,9 @@ Vec level_lookup(const TetsRef& tets, const VecRef& values, const VecRef& table,
                  bool periodic) {
   const Bins bins_of(tets, values, static_cast<Index>(table.size()), period, periodic);
   Vec mean = Vec::Zero(tets.rows());
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < static_cast<Index>(tets.rows()); ++t)
+  for_rows(static_cast<Index>(tets.rows()), [&](Index t) {
     for (const Index bin : bins_of(t)) mean[t] += 0.25 * table[bin];
+  });
   return mean;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "stretchmap/base/clones.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/volume/element_energy.hpp"
 
 namespace stretchmap::volume {
@@ -85,8 +86,8 @@ Vec longest_steps(const TetsRef& tets, const PointsRef& x, const PointsRef& dire
                   double limit) {
   const Index k = static_cast<Index>(tets.rows());
   Vec longest = Vec::Constant(k, limit);
-#pragma omp parallel for schedule(static)
-  for (Index first = 0; first < k; first += kLanes) {
+  for_rows(chunk_count(k, kLanes), kElementChunk / kLanes, [&](Index batch) {
+    const Index first = kLanes * batch;
     alignas(64) Lane E[9], D[9];
     const int count = static_cast<int>(std::min<Index>(kLanes, k - first));
     for (int l = 0; l < kLanes; ++l) {
@@ -108,7 +109,7 @@ Vec longest_steps(const TetsRef& tets, const PointsRef& x, const PointsRef& dire
       longest[first + l] =
           positive_length({volume.c[0][l], volume.c[1][l], volume.c[2][l], volume.c[3][l]}, limit);
     }
-  }
+  });
   return longest;
 }
 

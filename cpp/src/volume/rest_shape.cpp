@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/volume/signed_svd.hpp"
 
 namespace stretchmap::volume {
@@ -30,8 +31,7 @@ Rows rest_matrices(const PointsRef& V, const TetsRef& tets, double max_aspect) {
   const Matrix3d regular = regular_edges(), regular_inverse = regular.inverse();
   const Index k = static_cast<Index>(tets.rows());
   Rows rest(k, 9);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
+  for_rows(k, kElementChunk, [&](Index t) {
     Matrix3d edges;
     for (int a = 1; a < 4; ++a) edges.col(a - 1) = V.row(tets(t, a)) - V.row(tets(t, 0));
     Matrix3d shape = edges;
@@ -47,7 +47,7 @@ Rows rest_matrices(const PointsRef& V, const TetsRef& tets, double max_aspect) {
     const Matrix3d inverse = shape.inverse();
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) rest(t, 3 * i + j) = inverse(i, j);
-  }
+  });
   return rest;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/mesh/size.hpp"
 
 namespace stretchmap::volume {
@@ -16,15 +17,14 @@ using Row3 = Eigen::RowVector3d;
 std::vector<Points> volume_slopes(const PointsRef& x, const TetsRef& tets) {
   const Index k = static_cast<Index>(tets.rows());
   std::vector<Points> slopes(4, Points(k, 3));
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
+  for_rows(k, [&](Index t) {
     const Row3 a = x.row(tets(t, 0));
     const Row3 b = x.row(tets(t, 1)) - a, c = x.row(tets(t, 2)) - a, d = x.row(tets(t, 3)) - a;
     slopes[1].row(t) = c.cross(d) / 6.0;
     slopes[2].row(t) = d.cross(b) / 6.0;
     slopes[3].row(t) = b.cross(c) / 6.0;
     slopes[0].row(t) = -(slopes[1].row(t) + slopes[2].row(t) + slopes[3].row(t));
-  }
+  });
   return slopes;
 }
 
@@ -36,39 +36,36 @@ RingProjection::RingProjection(const TetsRef& tets, const FlagsRef& fixed)
 Vec RingProjection::rings(const VecRef& tet_values) const {
   const Index n = static_cast<Index>(fixed_.size());
   Vec sums = Vec::Zero(n);
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i) {
-    if (fixed_[i]) continue;
+  for_rows(n, [&](Index i) {
+    if (fixed_[i]) return;
     for (const Index corner : corners_[i]) sums[i] += tet_values[corner / 4];
-  }
+  });
   return sums;
 }
 
 Points RingProjection::transposed(const std::vector<Points>& slopes, const Vec& z) const {
   const Index n = static_cast<Index>(fixed_.size()), k = static_cast<Index>(tets_.rows());
   Vec tet(k);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t)
+  for_rows(k, [&](Index t) {
     tet[t] = z[tets_(t, 0)] + z[tets_(t, 1)] + z[tets_(t, 2)] + z[tets_(t, 3)];
+  });
   Points d = Points::Zero(n, 3);
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i) {
-    if (fixed_[i]) continue;
+  for_rows(n, [&](Index i) {
+    if (fixed_[i]) return;
     for (const Index corner : corners_[i])
       d.row(i) += tet[corner / 4] * slopes[corner % 4].row(corner / 4);
-  }
+  });
   return d;
 }
 
 Vec RingProjection::forward(const std::vector<Points>& slopes, const Points& d) const {
   const Index k = static_cast<Index>(tets_.rows());
   Vec tet(k);
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t) {
+  for_rows(k, [&](Index t) {
     double sum = 0.0;
     for (int c = 0; c < 4; ++c) sum += slopes[c].row(t).dot(d.row(tets_(t, c)));
     tet[t] = sum;
-  }
+  });
   return rings(tet);
 }
 

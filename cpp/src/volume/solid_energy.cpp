@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::volume {
 namespace {
 
@@ -69,25 +71,23 @@ SolidEnergy::Energies SolidEnergy::energies(const PointsRef& x, const EnergyWeig
   Energies found;
   found.tets.resize(k);
   found.det.resize(k);
-  constexpr Index kTetsAtOnce = 512;
-#pragma omp parallel for schedule(static)
-  for (Index run = 0; run < k; run += kTetsAtOnce)
+  for_chunks(k, kElementChunk, [&](Index begin, Index end) {
     for_batches(
-        x, w, run, std::min(k, run + kTetsAtOnce), element_values, [](Index t) { return t; },
+        x, w, begin, end, element_values, [](Index t) { return t; },
         [&](Index t, int lane, const ElementBatch& batch) {
           found.det[t] = batch.det[lane];
           found.tets[t] = batch.energy[lane];
         });
+  });
   if (!(w.face > 0.0) || barrier_.size() == 0) return found;
   found.faces.resize(barrier_.size());
   found.facing.resize(barrier_.size());
   const GlideSites at = sites(x, false);
-#pragma omp parallel for schedule(static)
-  for (Index f = 0; f < barrier_.size(); ++f) {
+  for_rows(barrier_.size(), kElementChunk, [&](Index f) {
     const FaceReport there = barrier_.value(x, at, f, w.epsilon);
     found.faces[f] = w.face * there.energy;
     found.facing[f] = there.facing;
-  }
+  });
   return found;
 }
 
@@ -145,8 +145,7 @@ void SolidEnergy::model(const PointsRef& x, const EnergyWeights& w, Points& grad
   gradient.setZero(rows(), 3);
   double* blocks = hessian ? hessian->values.data() : nullptr;
   const Index parts = static_cast<Index>(part_tets_.size());
-#pragma omp parallel for schedule(static, 1)
-  for (Index p = 0; p < parts; ++p) {
+  for_tasks(parts, [&](Index p) {
     const std::vector<Index>& list = part_tets_[p];
     if (blocks)
       std::fill(blocks + 9 * static_cast<std::ptrdiff_t>(row_ptr_[part_row_[p]]),
@@ -157,18 +156,17 @@ void SolidEnergy::model(const PointsRef& x, const EnergyWeights& w, Points& grad
         [&](Index t, int lane, const ElementBatch& batch) {
           add_element(batch, lane, t, part_row_[p], part_row_[p + 1], gradient, blocks);
         });
-  }
+  });
   if ((motion_.array() != kGliding).all()) return;
   const Index n_rows = rows();
   const GlideSites at = sites(x, true);
-#pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row) into_frames(x, at, w.negative, row, gradient, blocks);
+  for_rows(n_rows, kElementChunk,
+           [&](Index row) { into_frames(x, at, w.negative, row, gradient, blocks); });
   if (w.face <= 0.0) return;
-#pragma omp parallel for schedule(static, 1)
-  for (Index p = 0; p < parts; ++p) {
+  for_tasks(parts, [&](Index p) {
     for (const Index f : part_faces_[p])
       add_face(x, at, w, f, part_row_[p], part_row_[p + 1], gradient, blocks);
-  }
+  });
 }
 
 // Adds the boundary triangle's share to the rows in [first, last), which are in frames already.

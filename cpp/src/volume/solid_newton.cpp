@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/linalg/backtrack.hpp"
 
 namespace stretchmap::volume {
@@ -28,14 +29,13 @@ constexpr double kHeldUp = 0.5;      // a shorter step is worth a look at who ho
 // Adds a share of its mean to the diagonal of every diagonal block.
 void stiffen(BlockMatrix& A, double share) {
   if (share == 0.0) return;
-  const Index n = A.rows();
-#pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n; ++row)
+  for_rows(A.rows(), [&](Index row) {
     for (Index e = A.row_ptr[row]; e < A.row_ptr[row + 1]; ++e) {
       if (A.col[e] != row) continue;
       Block block(A.values.data() + 9 * static_cast<std::ptrdiff_t>(e));
       block.diagonal().array() += share * std::max(block.trace() / 3.0, 1e-300);
     }
+  });
 }
 
 }  // namespace

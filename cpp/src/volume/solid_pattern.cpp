@@ -5,10 +5,6 @@
 #include "stretchmap/linalg/pattern.hpp"
 #include "stretchmap/volume/solid_energy.hpp"
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 namespace stretchmap::volume {
 namespace {
 
@@ -22,14 +18,6 @@ std::uint32_t z_order(const RowVector3d& unit) {
     for (int bit = 0; bit < 10; ++bit) code |= ((cell >> bit) & 1u) << (3 * bit + axis);
   }
   return code;
-}
-
-int thread_count() {
-#ifdef _OPENMP
-  return omp_get_max_threads();
-#else
-  return 1;
-#endif
 }
 
 }  // namespace
@@ -111,7 +99,7 @@ void SolidEnergy::build_pattern() {
 
   place_.setZero(k, 16);
   for_chunks_with(
-      n_rows, [&] { return std::vector<Index>(n_rows); },
+      n_rows, kChunk, [&] { return std::vector<Index>(n_rows); },
       [&](Index begin, Index end, std::vector<Index>& place) {
         for (Index row = begin; row < end; ++row) {
           for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p)
@@ -138,7 +126,7 @@ void SolidEnergy::find_face_slots() {
 // A part per thread, and which elements it has to add up.
 void SolidEnergy::part_rows() {
   const Index n_rows = rows();
-  const Index parts = std::max<Index>(1, std::min<Index>(thread_count(), n_rows));
+  const Index parts = std::clamp<Index>(n_rows / kElementChunk, 1, thread_count());
   part_row_.resize(parts + 1);
   for (Index p = 0; p <= parts; ++p)
     part_row_[p] = static_cast<Index>(static_cast<std::int64_t>(n_rows) * p / parts);

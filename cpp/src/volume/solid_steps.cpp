@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/volume/line_bound.hpp"
 #include "stretchmap/volume/solid_energy.hpp"
 
@@ -22,19 +23,18 @@ constexpr double kEasing = 0.25;  // what is left of a step at the vertices of a
 Points SolidEnergy::move(const PointsRef& x, const PointsRef& step, double alpha) const {
   Points moved = x;
   const Index n_rows = rows();
-#pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row) {
+  for_rows(n_rows, kCostlyChunk, [&](Index row) {
     const Index i = row_vertex_[row];
     if (motion_[i] != kGliding) {
       moved.row(i) += alpha * step.row(row);
-      continue;
+      return;
     }
     const GlideSurface& surface = barrier_.surface();
     const Vector3d from = x.row(i).transpose();
     const Eigen::Vector2d along = alpha * step.row(row).head<2>().transpose();
     const Index at = surface.place(from, site_place_[site_number_[i]]);
     moved.row(i) = surface.moved(from, at, along).transpose();
-  }
+  });
   return moved;
 }
 
@@ -42,10 +42,10 @@ Points SolidEnergy::in_space(const PointsRef& x, const PointsRef& step) const {
   Points direction = Points::Zero(x.rows(), 3);
   const Index n_rows = rows();
   const GlideSites at = sites(x, true);
-#pragma omp parallel for schedule(static)
-  for (Index row = 0; row < n_rows; ++row)
+  for_rows(n_rows, kCostlyChunk, [&](Index row) {
     direction.row(row_vertex_[row]) =
         (frame(at, row_vertex_[row]) * step.row(row).transpose()).transpose();
+  });
   return direction;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "stretchmap/base/parallel.hpp"
 #include "volume/tet_weights.hpp"
 
 namespace stretchmap::volume {
@@ -49,20 +50,19 @@ SparseMatrix TetLaplacian::pattern() const {
 void TetLaplacian::assemble(const PointsRef& geometry, double c, const PointsRef& x,
                             SparseMatrix& matrix, Points& rhs) {
   const auto n = static_cast<Index>(plan_.order.size());
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i)
+  for_rows(n, [&](Index i) {
     for (int k = 0; k < 3; ++k)
       x_[4 * static_cast<std::size_t>(i) + k] = geometry(plan_.order[i], k);
+  });
   const TetWeightsKernel add_weights = tet_weights_kernel(lanes_);
-#pragma omp parallel for schedule(dynamic, 1)
-  for (Index chunk = 0; chunk < plan_.chunks(); ++chunk) {
+  for_tasks(plan_.chunks(), [&](Index chunk) {
     std::fill(sums_.begin() + plan_.chunk_slot[chunk], sums_.begin() + plan_.chunk_slot[chunk + 1],
               0.0);
     const auto first = static_cast<std::size_t>(plan_.chunk_tet[chunk]);
     add_weights({x_.data(), plan_.corners.data() + 4 * first, plan_.rest.data() + first,
                  plan_.slots.data() + 6 * first,
                  plan_.chunk_tet[chunk + 1] - plan_.chunk_tet[chunk], c, sums_.data()});
-  }
+  });
   copy_rows(x, matrix, rhs);
 }
 
@@ -71,8 +71,7 @@ void TetLaplacian::copy_rows(const PointsRef& x, SparseMatrix& matrix, Points& r
   const Index rows = plan_.rows();
   double* value = matrix.valuePtr();
   rhs.resize(rows, 3);
-#pragma omp parallel for schedule(static)
-  for (Index r = 0; r < rows; ++r) {
+  for_rows(rows, [&](Index r) {
     double total = 0.0;
     Index p = plan_.outer[r];
     for (Index e = plan_.lower_start[r]; e < plan_.lower_start[r + 1]; ++e)
@@ -87,7 +86,7 @@ void TetLaplacian::copy_rows(const PointsRef& x, SparseMatrix& matrix, Points& r
     }
     value[diagonal] = -total;
     rhs.row(r) = b;
-  }
+  });
 }
 
 double tet_stretch_energy(const VecRef& image_volumes, const VecRef& rest_volumes) {

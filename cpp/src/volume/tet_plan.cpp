@@ -4,6 +4,7 @@
 #include <array>
 
 #include "stretchmap/base/incidence.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "volume/tet_weights.hpp"
 
 namespace stretchmap::volume {
@@ -53,9 +54,9 @@ Numbered breadth_first(const TetsRef& tets, const FlagsRef& fixed) {
   }
   mesh.first_tet.push_back(k);
   mesh.corners.resize(4 * size_t(k));
-#pragma omp parallel for schedule(static)
-  for (Index t = 0; t < k; ++t)
+  for_rows(k, [&](Index t) {
     for (int j = 0; j < 4; ++j) mesh.corners[4 * size_t(t) + j] = number[tets(mesh.tet[t], j)];
+  });
   mesh.row.resize(n);
   Index rows = 0;
   for (Index i = 0; i < n; ++i) mesh.row[i] = fixed[mesh.order[i]] ? -1 : rows++;
@@ -107,8 +108,7 @@ class Builder {
 
   template <class Visit>
   void each_chunk(const Visit& visit) {
-#pragma omp parallel for schedule(dynamic, 1)
-    for (Index chunk = 0; chunk < chunks_; ++chunk) visit(chunk);
+    for_tasks(chunks_, [&](Index chunk) { visit(chunk); });
   }
   // visit(vertex, row) for the free vertices of a chunk
   template <class Visit>

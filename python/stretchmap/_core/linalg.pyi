@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import scipy.sparse
 import typing
-__all__: list[str] = ['SolveReport', 'SpdSolver']
+__all__: list[str] = ['SolveReport', 'SpdSolver', 'normal_matrix']
 class SolveReport:
     @property
     def converged(self) -> bool:
@@ -27,3 +27,5 @@ class SpdSolver:
     @property
     def backend(self) -> str:
         ...
+def normal_matrix(A: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    ...

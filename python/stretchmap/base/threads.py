@@ -24,8 +24,8 @@ def threads(count: int | None) -> Iterator[None]:
     was. Results do not depend on it, to the last bit.
 
     A forked process (``multiprocessing`` forks by default on Linux up to Python 3.13) computes with
-    one thread whatever is asked, since the OpenMP runtime does not survive a fork. Threads started
-    there, and processes that are spawned, have as many as they like.
+    one thread whatever is asked, since the threads of its parent are not there any more. Threads
+    started there, and processes that are spawned, have as many as they like.
 
     Parameters
     ----------

@@ -47,7 +47,6 @@ def doctor(json: Json = None, quiet: Quiet = False) -> None:
         "BLAS of NumPy": _blas(),
         "processors": os.cpu_count(),
         "threads": _threads(),
-        "OpenMP": _openmp(),
         **{f"extra {extra}": _installed(packages) for extra, packages in _EXTRAS.items()},
         "self-test": _self_test(),
     }
@@ -73,13 +72,6 @@ def _threads() -> str:
 
     asked = os.environ.get("OMP_NUM_THREADS")
     return f"{_core.base.thread_count()}" + (f" (OMP_NUM_THREADS={asked})" if asked else "")
-
-
-def _openmp() -> str:
-    from .. import _core
-
-    version = _core.base.openmp_version()
-    return str(version) if version else "none: every map takes one thread"
 
 
 def _installed(packages: tuple[str, ...]) -> str:

@@ -225,10 +225,11 @@ class _Equations:
     def draw(self, features: Array, normals: Array, gaps: Array, weight: float) -> None:
         """Displacements along normals (n, 3) are to be the gaps (n,)."""
         for a in range(3):
-            left = np.ascontiguousarray((weight * normals[:, a, None] * features).T)
-            self.right[a] += np.einsum("rn,n->r", left, gaps)
+            along = weight * normals[:, a]
+            self.right[a] += np.einsum("nr,n->r", features, along * gaps)
             for b in range(a, 3):
-                block = left @ (normals[:, b, None] * features)
+                # Not by BLAS, whose threads take turns with all else that the machine has to do.
+                block = _core.linalg.normal_matrix(features, along * normals[:, b])
                 self.matrix[a, :, b] += block
                 if b != a:
                     self.matrix[b, :, a] += block.T

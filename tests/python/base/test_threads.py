@@ -8,10 +8,6 @@ import pytest
 import stretchmap as sm
 from stretchmap import _core, errors, samples
 
-with_threads = pytest.mark.skipif(
-    _core.base.openmp_version() == 0, reason="built without OpenMP: one thread whatever is asked"
-)
-
 
 @pytest.fixture(scope="module")
 def solid():
@@ -33,7 +29,6 @@ def test_maps_are_the_same_to_the_last_bit(solid, options):
         np.testing.assert_equal(history(one), history(other))
 
 
-@with_threads
 def test_the_number_is_put_back(solid):
     before = _core.base.thread_count()
     with sm.threads(before + 1):
@@ -46,7 +41,6 @@ def test_the_number_is_put_back(solid):
     assert _core.base.thread_count() == before
 
 
-@with_threads
 def test_map_functions_set_it_while_they_run():
     seen = []
     surface = samples.bumpy_torus(2000).surface

@@ -1,5 +1,6 @@
 // Loops over rows in fixed chunks: what a chunk computes, and the order in which partial sums are
-// added, do not depend on the number of threads.
+// added, do not depend on the number of threads. How many share a loop is decided by its chunks: a
+// chunk should be worth some ten microseconds, and a thread gets two of them or is not called.
 #pragma once
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "stretchmap/base/threads.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap {
@@ -20,41 +22,78 @@ Eigen::Map<const Lanes<Real, N>> lanes(const Real* from) {
   return Eigen::Map<const Lanes<Real, N>>(from);
 }
 
-inline constexpr Index kChunk = 2048;  // rows per chunk
+// Rows per chunk that take some nanoseconds each, a tenth of a microsecond, and a microsecond.
+inline constexpr Index kChunk = 2048, kElementChunk = 512, kCostlyChunk = 64;
 
 inline Index chunk_count(Index n, Index size = kChunk) { return (n + size - 1) / size; }
 
-// body(begin, end) for every chunk of [0, n).
-template <class Body>
-void for_chunks(Index n, const Body& body, Index size = kChunk) {
-  const Index chunks = chunk_count(n, size);
-#pragma omp parallel for schedule(static) if (chunks > 3)
-  for (Index c = 0; c < chunks; ++c) body(c * size, std::min(n, (c + 1) * size));
+// work(shares) by every thread that takes part, at most `most`.
+template <class Work>
+void share_chunks(Index chunks, Index most, Work& work) {
+  share_out(
+      chunks, most,
+      [](void* context, Shares& shares) noexcept { (*static_cast<Work*>(context))(shares); },
+      &work);
 }
 
-// The same with a workspace per thread, made by make(); results must not depend on which.
-template <class Make, class Body>
-void for_chunks_with(Index n, const Make& make, const Body& body, Index size = kChunk) {
+// body(task) for every task of [0, count), each of them worth a thread.
+template <class Body>
+void for_tasks(Index count, const Body& body) {
+  auto work = [&](Shares& shares) {
+    for (Index task = shares.next(); task >= 0; task = shares.next()) body(task);
+  };
+  share_chunks(count, count, work);
+}
+
+// body(begin, end) for every chunk of [0, n).
+template <class Body>
+void for_chunks(Index n, Index size, const Body& body) {
   const Index chunks = chunk_count(n, size);
-#pragma omp parallel if (chunks > 3)
-  {
-    auto workspace = make();
-#pragma omp for schedule(static)
-    for (Index c = 0; c < chunks; ++c) body(c * size, std::min(n, (c + 1) * size), workspace);
-  }
+  auto work = [&](Shares& shares) {
+    for (Index c = shares.next(); c >= 0; c = shares.next())
+      body(c * size, std::min(n, (c + 1) * size));
+  };
+  share_chunks(chunks, chunks / 2, work);
+}
+template <class Body>
+void for_chunks(Index n, const Body& body) {
+  for_chunks(n, kChunk, body);
+}
+
+// body(i) for every i of [0, n).
+template <class Body>
+void for_rows(Index n, Index size, const Body& body) {
+  for_chunks(n, size, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) body(i);
+  });
+}
+template <class Body>
+void for_rows(Index n, const Body& body) {
+  for_rows(n, kChunk, body);
+}
+
+// As for_chunks with a workspace per thread, made by make(); results must not depend on which.
+template <class Make, class Body>
+void for_chunks_with(Index n, Index size, const Make& make, const Body& body) {
+  const Index chunks = chunk_count(n, size);
+  auto work = [&](Shares& shares) {
+    Index c = shares.next();
+    if (c < 0) return;
+    for (auto workspace = make(); c >= 0; c = shares.next())
+      body(c * size, std::min(n, (c + 1) * size), workspace);
+  };
+  share_chunks(chunks, chunks / 2, work);
 }
 
 // body(begin, end, sums) adds to sums[0 .. K-1]; the chunks' sums are added in order.
 template <int K, class Body>
 std::array<double, K> sum_chunks(Index n, const Body& body) {
-  const Index chunks = chunk_count(n);
-  std::vector<std::array<double, K>> partial(static_cast<std::size_t>(chunks));
-#pragma omp parallel for schedule(static) if (chunks > 3)
-  for (Index c = 0; c < chunks; ++c) {
+  std::vector<std::array<double, K>> partial(static_cast<std::size_t>(chunk_count(n)));
+  for_chunks(n, [&](Index begin, Index end) {
     std::array<double, K> sums{};
-    body(c * kChunk, std::min(n, (c + 1) * kChunk), sums);
-    partial[static_cast<std::size_t>(c)] = sums;
-  }
+    body(begin, end, sums);
+    partial[static_cast<std::size_t>(begin / kChunk)] = sums;
+  });
   std::array<double, K> total{};
   for (const auto& sums : partial)
     for (int k = 0; k < K; ++k) total[k] += sums[k];

@@ -46,7 +46,7 @@ Pattern build_pattern(Index rows, Index columns, const Collect& collect) {
   pattern.columns = columns;
   pattern.start.assign(static_cast<std::size_t>(rows) + 1, 0);
   for_chunks_with(
-      rows, [&] { return RowSet(columns); },
+      rows, kChunk, [&] { return RowSet(columns); },
       [&](Index begin, Index end, RowSet& set) {
         std::vector<Index>& part = parts[begin / kChunk];
         for (Index i = begin; i < end; ++i) {

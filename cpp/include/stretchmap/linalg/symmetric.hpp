@@ -42,4 +42,8 @@ Eigen::MatrixXd map_eigenvalues(const DenseRef& A,
 // \return A W A' for the diagonal matrix W of the weights.
 Rows weighted_gram(const Rows& A, const VecRef& weights);
 
+// A' W A for a tall matrix A, as in normal equations. All processors and numbers of threads give
+// the same bits.
+Rows normal_matrix(const RowsRef& A, const VecRef& weights);
+
 }  // namespace stretchmap::linalg

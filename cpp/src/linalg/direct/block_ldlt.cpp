@@ -6,6 +6,7 @@
 #include "linalg/direct/dense_front.hpp"
 #include "linalg/direct/nested_dissection.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 
 namespace stretchmap::linalg {
 
@@ -156,14 +157,13 @@ void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
   std::vector<Leftover> leftovers(fronts_.size());
   std::vector<std::exception_ptr> failed(trees_.size());
   if (poll) poll();
-#pragma omp parallel for schedule(dynamic)
-  for (Index t = 0; t < static_cast<Index>(trees_.size()); ++t) {
+  for_tasks(static_cast<Index>(trees_.size()), [&](Index t) {
     try {
       for (Index f = trees_[t].first; f < trees_[t].second; ++f) eliminate(A, f, leftovers);
     } catch (...) {
       failed[t] = std::current_exception();
     }
-  }
+  });
   for (const std::exception_ptr& error : failed)
     if (error) std::rethrow_exception(error);
   for (const Index f : top_) {

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "stretchmap/base/clones.hpp"
+#include "stretchmap/base/parallel.hpp"
+#include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::linalg {
 
@@ -72,8 +74,7 @@ void update(const Target& target, const double* panel, std::ptrdiff_t rows, Inde
   for (Index begin = 0; begin < depth; begin += kDeep) {
     const Index end = std::min(depth, begin + kDeep), deep = end - begin;
     pack(panel, rows, first_column, target.columns, begin, end, kWide, diagonal, right.data());
-#pragma omp parallel for schedule(dynamic) if (blocks > 3)
-    for (Index block = 0; block < blocks; ++block) {
+    for_rows(blocks, 1, [&](Index block) {
       const Index top = block * kRows, height = std::min(kRows, target.rows - top);
       thread_local std::vector<double> left;
       left.resize(static_cast<std::size_t>(kRows) * kDeep);
@@ -92,7 +93,7 @@ void update(const Target& target, const double* panel, std::ptrdiff_t rows, Inde
             for (Index i = 0; i < tall; ++i) to[i] -= tile[kTall * j + i];
           }
         }
-    }
+    });
   }
 }
 
@@ -114,6 +115,16 @@ Index eliminate_front(double* panel, double* schur, Index rows, Index own) {
   update({schur, stride - own, rows - own, rows - own}, panel, stride, own, own, own,
          diagonal.data());
   return -1;
+}
+
+Rows normal_matrix(const RowsRef& A, const VecRef& weights) {
+  const Index n = static_cast<Index>(A.cols());
+  Rows product = Rows::Zero(n, n);
+  const Vec negative = -weights;
+  update({product.data(), n, n, n}, A.data(), n, 0, 0, static_cast<Index>(A.rows()),
+         negative.data());
+  product.triangularView<Eigen::StrictlyLower>() = product.transpose();
+  return product;
 }
 
 }  // namespace stretchmap::linalg

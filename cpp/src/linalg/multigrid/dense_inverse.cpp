@@ -38,17 +38,13 @@ template <int N>
 void DenseInverse::apply(const float* b, float* x) const {
   std::fill_n(x, static_cast<size_t>(N) * n_, 0.0f);
   if (inverse_.empty()) return;
-  for_chunks(
-      n_,
-      [&](Index begin, Index end) {
-        for (Index j = 0; j < n_; ++j) {
-          const float* column = inverse_.data() + static_cast<size_t>(n_) * j;
-          for (size_t i = begin; i < static_cast<size_t>(end); ++i)
-            for (int k = 0; k < N; ++k)
-              x[N * i + k] += column[i] * b[static_cast<size_t>(N) * j + k];
-        }
-      },
-      kChunk / 16);
+  for_chunks(n_, kChunk / 16, [&](Index begin, Index end) {
+    for (Index j = 0; j < n_; ++j) {
+      const float* column = inverse_.data() + static_cast<size_t>(n_) * j;
+      for (size_t i = begin; i < static_cast<size_t>(end); ++i)
+        for (int k = 0; k < N; ++k) x[N * i + k] += column[i] * b[static_cast<size_t>(N) * j + k];
+    }
+  });
 }
 
 template void DenseInverse::apply<1>(const float*, float*) const;

@@ -51,7 +51,7 @@ void LevelMatrix<B>::set_pattern(Index rows, const Index* row_start, const Index
     Index column, from;
   };
   for_chunks_with(
-      n, [] { return std::vector<Entry>(); },
+      n, chunk, [] { return std::vector<Entry>(); },
       [&](Index begin, Index end, std::vector<Entry>& entries) {
         const Index first = begin, last = end;
         for (Index i = begin; i < end; ++i) {
@@ -75,8 +75,7 @@ void LevelMatrix<B>::set_pattern(Index rows, const Index* row_start, const Index
             if (entry.group < 2) upper[i] = at;
           }
         }
-      },
-      chunk);
+      });
   set_sweep_pattern();
 }
 

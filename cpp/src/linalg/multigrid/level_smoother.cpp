@@ -75,16 +75,13 @@ void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
     for (Index e = from.start[i]; e < from.start[i + 1]; ++e)
       row.subtract(from.value.data() + kBlock * e, x + kRow * from.col[e]);
   };
-  for_chunks(
-      n,
-      [&](Index begin, Index end) {
-        for (Index i = begin; i < end; ++i) {
-          RowSum<B, K> row(b + kRow * i);
-          subtract(earlier, i, row);
-          row.store(row.transform(inverse_f.data() + kBlock * i, row.total()), x + kRow * i);
-        }
-      },
-      chunk);
+  for_chunks(n, chunk, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      RowSum<B, K> row(b + kRow * i);
+      subtract(earlier, i, row);
+      row.store(row.transform(inverse_f.data() + kBlock * i, row.total()), x + kRow * i);
+    }
+  });
   // The sweep solved the earlier columns and the diagonal exactly; the rest is the residual.
   for_chunks(n, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
@@ -105,25 +102,22 @@ template <int B>
 template <int K>
 void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) const {
   constexpr size_t kBlock = B * B, kRow = B * K;
-  for_chunks(
-      n,
-      [&](Index begin, Index end) {
-        for (Index i = end - 1; i >= begin; --i) {
-          // Backwards through memory, too; the nearest row, whose result was written last, at the
-          // end of what waits for such.
-          RowSum<B, K> known(b + kRow * i), next;
-          for (Index e = rest.start[i + 1] - 1; e >= later[i]; --e)
-            next.subtract(rest.value.data() + kBlock * e, x + kRow * rest.col[e]);
-          for (Index e = later[i] - 1; e >= rest.start[i]; --e)
-            known.subtract(rest.value.data() + kBlock * e, y + kRow * rest.col[e]);
-          for (Index e = earlier.start[i + 1] - 1; e >= earlier.start[i]; --e)
-            known.subtract(earlier.value.data() + kBlock * e, y + kRow * earlier.col[e]);
-          auto moved = known.transform(inverse_f.data() + kBlock * i, known.total() + next.total());
-          moved += excess[i] * RowSum<B, K>(y + kRow * i).total();
-          known.store(moved, x + kRow * i);
-        }
-      },
-      chunk);
+  for_chunks(n, chunk, [&](Index begin, Index end) {
+    for (Index i = end - 1; i >= begin; --i) {
+      // Backwards through memory, too; the nearest row, whose result was written last, at the
+      // end of what waits for such.
+      RowSum<B, K> known(b + kRow * i), next;
+      for (Index e = rest.start[i + 1] - 1; e >= later[i]; --e)
+        next.subtract(rest.value.data() + kBlock * e, x + kRow * rest.col[e]);
+      for (Index e = later[i] - 1; e >= rest.start[i]; --e)
+        known.subtract(rest.value.data() + kBlock * e, y + kRow * rest.col[e]);
+      for (Index e = earlier.start[i + 1] - 1; e >= earlier.start[i]; --e)
+        known.subtract(earlier.value.data() + kBlock * e, y + kRow * earlier.col[e]);
+      auto moved = known.transform(inverse_f.data() + kBlock * i, known.total() + next.total());
+      moved += excess[i] * RowSum<B, K>(y + kRow * i).total();
+      known.store(moved, x + kRow * i);
+    }
+  });
 }
 
 template <int B>

@@ -180,7 +180,7 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
     }
   };
   for_chunks_with(
-      A.n, [&] { return std::vector<Index>(aggregates.count); }, rows);
+      A.n, kChunk, [&] { return std::vector<Index>(aggregates.count); }, rows);
   r_value.resize(p_value.size());
   for_chunks(r.rows(), [&](Index begin, Index end) {
     for (size_t e = r.start[begin]; e < static_cast<size_t>(r.start[end]); ++e)
@@ -208,7 +208,7 @@ void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index l
   constexpr size_t kSize = static_cast<size_t>(B) * K;
   product.assign(kSize * (ap.start[last] - ap.start[first]) + 1, 0.0);  // see add_block_products
   for_chunks_with(
-      last - first, [&] { return std::vector<Index>(aggregates.count); },
+      last - first, kChunk / 8, [&] { return std::vector<Index>(aggregates.count); },
       [&](Index begin, Index end, std::vector<Index>& slot) {
         for (Index i = first + begin; i < first + end; ++i) {
           for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e)
@@ -218,8 +218,7 @@ void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index l
           for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
             add_row(A.block(e).data(), *this, A.col[e], slot.data(), product.data());
         }
-      },
-      kChunk / 8);
+      });
 }
 
 template <int B, int K>
@@ -232,7 +231,7 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const
     const Index last = std::min(A.n, first + at_once);
     multiply_rows(A, first, last, product);
     for_chunks_with(
-        coarse.rows(), [&] { return std::vector<Index>(aggregates.count); },
+        coarse.rows(), kChunk / 16, [&] { return std::vector<Index>(aggregates.count); },
         [&](Index begin, Index end, std::vector<Index>& slot) {
           for (Index a = begin; a < end; ++a) {
             Index& e = next[a];
@@ -254,8 +253,7 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const
                 multiply_add<K, B, K, true>(left, right, values.data() + kCoarse * slot[ap.col[f]]);
             }
           }
-        },
-        kChunk / 16);
+        });
   }
   keep_regular(values);
   return values;
@@ -281,30 +279,26 @@ template <int B, int K>
 template <int N>
 void Transfer<B, K>::restrict_to(const float* r_fine, float* b) const {
   static_assert(N == 1 || (B == 1 && K == 1));
-  for_chunks(
-      r.rows(),
-      [&](Index begin, Index end) {
-        for (Index a = begin; a < end; ++a) {
-          if constexpr (N > 1) {
-            Lanes<float, N> total = Lanes<float, N>::Zero();
-            for (Index e = r.start[a]; e < r.start[a + 1]; ++e)
-              total += r_value[e] * lanes<N>(r_fine + static_cast<size_t>(N) * r.col[e]);
-            Eigen::Map<Lanes<float, N>>(b + static_cast<size_t>(N) * a) = total;
-            continue;
-          }
-          float sum[K * N] = {};
-          for (Index e = r.start[a]; e < r.start[a + 1]; ++e) {
-            const float* block = r_value.data() + static_cast<size_t>(B * K) * e;
-            const float* from = r_fine + static_cast<size_t>(B * N) * r.col[e];
-            for (int row = 0; row < B; ++row)
-              for (int k = 0; k < K; ++k)
-                for (int j = 0; j < N; ++j)
-                  sum[N * k + j] += block[K * row + k] * from[N * row + j];
-          }
-          for (int k = 0; k < K * N; ++k) b[static_cast<size_t>(K * N) * a + k] = sum[k];
-        }
-      },
-      kChunk / 16);
+  for_chunks(r.rows(), kChunk / 16, [&](Index begin, Index end) {
+    for (Index a = begin; a < end; ++a) {
+      if constexpr (N > 1) {
+        Lanes<float, N> total = Lanes<float, N>::Zero();
+        for (Index e = r.start[a]; e < r.start[a + 1]; ++e)
+          total += r_value[e] * lanes<N>(r_fine + static_cast<size_t>(N) * r.col[e]);
+        Eigen::Map<Lanes<float, N>>(b + static_cast<size_t>(N) * a) = total;
+        continue;
+      }
+      float sum[K * N] = {};
+      for (Index e = r.start[a]; e < r.start[a + 1]; ++e) {
+        const float* block = r_value.data() + static_cast<size_t>(B * K) * e;
+        const float* from = r_fine + static_cast<size_t>(B * N) * r.col[e];
+        for (int row = 0; row < B; ++row)
+          for (int k = 0; k < K; ++k)
+            for (int j = 0; j < N; ++j) sum[N * k + j] += block[K * row + k] * from[N * row + j];
+      }
+      for (int k = 0; k < K * N; ++k) b[static_cast<size_t>(K * N) * a + k] = sum[k];
+    }
+  });
 }
 
 template <int B, int K>
