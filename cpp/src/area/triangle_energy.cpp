@@ -1,5 +1,6 @@
 #include "stretchmap/area/triangle_energy.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 

@@ -1,10 +1,10 @@
 #include "stretchmap/forms/harmonic.hpp"
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/linalg/sparse_ldlt.hpp"
 #include "stretchmap/linalg/spd_solver.hpp"
 #include "stretchmap/linalg/symmetric.hpp"
 
@@ -36,14 +36,13 @@ SparseMatrix pinned_laplacian(Index n, const EdgesRef& edges, const VecRef& weig
   return matrix;
 }
 
-Rows solved_directly(const SparseMatrix& A, const Rows& b) {
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(A);
-  if (solver.info() != Eigen::Success) {
+Rows solved_directly(const SparseMatrix& A, Rows b) {
+  if (!linalg::solve_ldlt(A, b)) {
     throw Error("SolverError",
                 "the surface Laplacian could not be factorized; look for degenerate faces with "
                 "diagnose()");
   }
-  return solver.solve(b);
+  return b;
 }
 
 // Large systems by multigrid, unless weights that differ too much keep it from converging.

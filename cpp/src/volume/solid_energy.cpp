@@ -1,5 +1,6 @@
 #include "stretchmap/volume/solid_energy.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,9 +1,12 @@
 // Array types shared by every stage. Points and index arrays are row-major, so a NumPy array in C
-// order is viewed without a copy.
+// order is viewed without a copy. Of Eigen what most files need; decompositions are included where
+// they are used.
 #pragma once
 
-#include <Eigen/Dense>
-#include <Eigen/Sparse>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SparseCore>
 #include <cstdint>
 #include <functional>
 

@@ -7,6 +7,12 @@
 
 namespace stretchmap::linalg {
 
+using ColumnMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
+
+// One class for L L' and L D L', as what they share takes a compiler longer than what they do not.
+using SparseFactor =
+    Eigen::SimplicialCholesky<ColumnMatrix, Eigen::Lower, Eigen::AMDOrdering<Index>>;
+
 class Cholesky {
  public:
   // \throws SolverError if A is not positive definite.
@@ -21,8 +27,7 @@ class Cholesky {
  private:
   template <int K>
   void substitute(const double* B, double* X);
-  using ColumnMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
-  Eigen::SimplicialLLT<ColumnMatrix, Eigen::Lower, Eigen::AMDOrdering<Index>> factor_;
+  SparseFactor factor_;
   std::vector<double> work_;
 };
 

@@ -1,6 +1,6 @@
 #include "linalg/multigrid/level_matrix.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <cmath>
 
 #include "stretchmap/linalg/symmetric.hpp"
