@@ -8,6 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from ..base.arrays import as_reals
 from ..base.tables import HasSummary, cell, plain_dict
 from ..base.torus import Torus
 from ..errors import OptionError
@@ -147,6 +148,8 @@ def compare(
         raise OptionError("images must be a dict with at least one image or map, by name")
     distortions, certificates = {}, {}
     for name, image in images.items():
+        if not isinstance(name, str):
+            raise OptionError(f"images must go by names, and {name!r} is not a str")
         if isinstance(image, MapResult):
             own = image.mesh
             n = mesh.n_vertices
@@ -157,6 +160,7 @@ def compare(
             distortions[name] = image.distortion
             certificates[name] = certify(own, image.image, image.torus)
         else:
+            image = as_reals(image, f"images[{name!r}]", mesh.V.shape)
             distortions[name] = distortion(mesh, image, torus=torus)
             certificates[name] = certify(mesh, image, torus)
     return Comparison(mesh, distortions, certificates)

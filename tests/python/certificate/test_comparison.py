@@ -7,7 +7,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import samples
-from stretchmap.errors import KindError, OptionError
+from stretchmap.errors import ArrayError, KindError, OptionError
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +54,10 @@ def test_what_cannot_be_compared_is_refused(solid):
         sm.compare(solid, {})
     with pytest.raises(KindError):
         sm.compare("solid", {"a": np.zeros((3, 3))})
+    with pytest.raises(OptionError, match="names, and 1 is not"):
+        sm.compare(solid, {1: solid.V})
+    with pytest.raises(ArrayError, match=r"images\['short'\] must have shape"):
+        sm.compare(solid, {"good": solid.V, "short": solid.V[:3]})
 
 
 def test_a_comparison_is_drawn(solid, tmp_path):
