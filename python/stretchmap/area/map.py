@@ -22,13 +22,13 @@ from .coarse import Level, levels
 from .finish import Steps, finish_areas, unfold_faces
 from .flat import unfolded_turns
 from .result import AreaMap
-from .route import Finish, Made, Route, follow
+from .route import EqualAreas, Finish, Made, Route, follow
 from .search import Ratio
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["SHAPES", "Finish", "along", "area_map", "finished"]
+__all__ = ["SHAPES", "Finish", "area_map", "charted", "equal_areas", "finished"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -155,7 +155,7 @@ def area_map(
     seconds = {"conformal": time.perf_counter() - clock}
     wanted = ratio if torus is None else torus.ratio
     steps = Steps(max_iter, tol, shape_budget if balance == 1.0 else math.inf, balance)
-    found = along(
+    found = _along(
         Route(phase, wanted, sem_iter, finish, steps), surface, conformal, progress, torus
     )
     if not found.converged:
@@ -169,7 +169,7 @@ def area_map(
     return dataclasses.replace(found, seconds={**seconds, **found.seconds})
 
 
-def along(
+def _along(
     route: Route,
     surface: TriMesh,
     conformal: ConformalMap,
@@ -177,17 +177,18 @@ def along(
     torus: Torus | None = None,
 ) -> AreaMap:
     """The map a route leads to, certified or not; by rising weights of shape while it is folded."""
-    finest = Level.of(
-        surface, unfolded_turns(surface, conformal), conformal.forms, conformal.aspect
-    )
-    made = follow(route, [finest] if route.finish == "none" else levels(finest), progress)
+    equal = equal_areas(surface, conformal, progress)
+    finest = equal.level
+    if route.finish == "none":
+        return charted(route, equal, conformal, progress, torus)
+    made = follow(route, levels(finest), progress)
     found = _result(surface, conformal, made, torus)
     for shape in SHAPES:
-        if route.finish == "none" or found.certificate.certified or not _folded(found):
+        if found.certificate.certified or not _folded(found):
             break
         _log.info("%s: once more with weight %g of shape", found.certificate.reason, shape)
         try:
-            made = follow(dataclasses.replace(route, shape=shape), [finest], progress)
+            made = follow(dataclasses.replace(route, shape=shape), [finest], progress, equal)
         except SolverError as error:  # sizes of faces are lost in rounding; what there is, stands
             _log.info("%s", error)
             continue
@@ -196,6 +197,24 @@ def along(
         if other.certificate.certified or _folded(other) < _folded(found):
             found = other
     return found
+
+
+def equal_areas(surface: TriMesh, conformal: ConformalMap, progress: Progress | None) -> EqualAreas:
+    """The flat chart of a surface, areas yet to be made equal."""
+    turns = unfolded_turns(surface, conformal)
+    return EqualAreas(Level.of(surface, turns, conformal.forms, conformal.aspect), progress)
+
+
+def charted(
+    route: Route,
+    equal: EqualAreas,
+    conformal: ConformalMap,
+    progress: Progress | None,
+    torus: Torus | None = None,
+) -> AreaMap:
+    """The unfinished map of a route, as it is in the chart, certified or not."""
+    made = follow(route, [equal.level], progress, equal)
+    return _result(equal.level.surface, conformal, made, torus)
 
 
 def _folded(found: AreaMap) -> int:

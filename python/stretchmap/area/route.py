@@ -23,6 +23,7 @@ from .sem import minimize_stretch
 _log = logging.getLogger("stretchmap")
 
 Finish = Literal["ring", "face", "none"]
+_Turns = tuple[NDArray[np.float64], list[IterationRecord]]
 
 
 @dataclass(frozen=True)
@@ -54,18 +55,53 @@ class Made:
         self.history += records if finest else [_of_coarse(record) for record in records]
 
 
-def follow(route: Route, stack: list[Level], progress: Progress | None) -> Made:
-    """Angles of the first level: by way of the last, or without if they fold on the way up."""
+class EqualAreas:
+    """Turns of a level with nearly equal areas; they do not depend on phase and ratio, so each kind
+    is made once.
+
+    Parameters
+    ----------
+    level : Level
+    progress : Progress or None
+    """
+
+    def __init__(self, level: Level, progress: Progress | None) -> None:
+        self.level = level
+        self._progress = progress
+        self._stretched: dict[int, _Turns] = {}
+        self._balanced: dict[float, _Turns] = {}
+
+    def stretched(self, sem_iter: int) -> _Turns:
+        """By so many steps (4.5); with records."""
+        if sem_iter not in self._stretched:
+            self._stretched[sem_iter] = minimize_stretch(self.level, sem_iter, self._progress)
+        return self._stretched[sem_iter]
+
+    def balanced(self, shape: float) -> _Turns:
+        """By Newton steps, with that weight of shape; with records."""
+        if shape not in self._balanced:
+            self._balanced[shape] = balance_areas(self.level, shape, self._progress)
+        return self._balanced[shape]
+
+
+def follow(
+    route: Route, stack: list[Level], progress: Progress | None, equal: EqualAreas | None = None
+) -> Made:
+    """Angles of the first level: by way of the last, or without if they fold on the way up.
+
+    ``equal`` is that of the last level, if there is one already.
+    """
     try:
-        return _climb(route, stack, progress)
+        return _climb(route, stack, equal or EqualAreas(stack[-1], progress), progress)
     except Folded:
         _log.info("a coarser surface's map folds faces of this one: mapped without it")
-        return _climb(route, [dataclasses.replace(stack[0], coarse=None)], progress)
+        finest = dataclasses.replace(stack[0], coarse=None)
+        return _climb(route, [finest], EqualAreas(finest, progress), progress)
 
 
-def _climb(route: Route, stack: list[Level], progress: Progress | None) -> Made:
+def _climb(route: Route, stack: list[Level], equal: EqualAreas, progress: Progress | None) -> Made:
     clock = time.perf_counter()
-    turns, found, records = _equal_areas(route, stack[-1], progress)
+    turns, found, records = _equal_areas(route, equal)
     phase, ratio, _ = found
     middle = time.perf_counter()
     made = Made(start_angles(stack[-1].chart, turns, phase, ratio), phase, ratio, [])
@@ -93,15 +129,15 @@ def _climb(route: Route, stack: list[Level], progress: Progress | None) -> Made:
 
 
 def _equal_areas(
-    route: Route, level: Level, progress: Progress | None
+    route: Route, equal: EqualAreas
 ) -> tuple[NDArray[np.float64], tuple[float, float, float], list[IterationRecord]]:
     """Turns with nearly equal areas; phase, ratio and energy of their image; records."""
-    surface, phase, ratio = level.surface, route.phase, route.ratio
-    turns, history = minimize_stretch(level, route.sem_iter, progress)
-    found = search_phase(surface, turns, level.aspect, phase, ratio)
+    level, phase, ratio = equal.level, route.phase, route.ratio
+    turns, history = equal.stretched(route.sem_iter)
+    found = search_phase(level.surface, turns, level.aspect, phase, ratio)
     if route.shape or (route.sem_iter and history[-1].energy > 1.0 + JAMMED):
-        balanced, records = balance_areas(level, route.shape, progress)
-        other = search_phase(surface, balanced, level.aspect, phase, ratio)
+        balanced, records = equal.balanced(route.shape)
+        other = search_phase(level.surface, balanced, level.aspect, phase, ratio)
         # Where only few places are jammed, areas come at the price of all shapes.
         if route.shape or other[-1] < found[-1]:
             return balanced, other, history + records

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
+from .. import _core
 from ..area.finish import Steps
-from ..area.map import SHAPES, along, finished
+from ..area.map import SHAPES, charted, equal_areas, finished
 from ..area.result import AreaMap
 from ..area.route import Route
 from ..area.search import Ratio
@@ -99,6 +100,7 @@ class _BoundaryMaps:
     def __init__(self, surface: TriMesh, options: VolumeOptions, progress: Progress | None) -> None:
         self.surface, self.phase, self.progress = surface, options.phase, progress
         self.conformal = conformal_map(surface, progress=progress)
+        self.equal = equal_areas(surface, self.conformal, progress)
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
         self.is_unfolded = False
@@ -153,15 +155,21 @@ class _BoundaryMaps:
     def gentle(self, ratio: Ratio | float, *less_fat: float) -> AreaMap | None:
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
-        lost = False
-        tried = [(ratio, shape) for shape in _GENTLE] + [(less, _GENTLE[0]) for less in less_fat]
-        for at, shape in tried:
-            found = self._chart(at, shape)
-            least = np.abs(found.distortion.ratios).min()
-            lost = lost or least < _LOST
-            if found.certificate.certified and least >= _LOST:
-                return found
-        return self._unfolded(ratio, _LIGHTER) if lost else None
+        folded, lost = [], False
+        for at in (ratio, *less_fat):
+            for shape in _GENTLE:
+                found = self._chart(at, shape)
+                kept = np.abs(found.distortion.ratios).min() >= _LOST
+                if kept and found.certificate.certified:
+                    return found
+                lost = lost or not kept
+            if kept:
+                folded.append(found)
+        if lost:
+            return self._unfolded(ratio, _LIGHTER)
+        # Where coarse triangles fold on every torus, these few get their areas instead.
+        turned = (self._turned(found) for found in folded)
+        return next((found for found in turned if found and not found.history[-1].flips), None)
 
     def gentle_finished(self) -> AreaMap | None:
         found = self.gentle(self.ratio)
@@ -174,12 +182,15 @@ class _BoundaryMaps:
         """With its folded faces turned outward; None if they are too many."""
         if found.certificate.certified:
             return found
-        folded = len(found.certificate.ids.get("boundary_graph", ()))
-        if folded > _TOO_MANY * len(self.surface.F):
+        if self._not_outward(found) > _TOO_MANY * len(self.surface.F):
             return None
         return finished(found, max_iter=0, tol=_TOL, progress=self.progress)
+
+    def _not_outward(self, found: AreaMap) -> int:
+        """Faces that do not look outward everywhere."""
+        return len(_core.certificate.torus_graph(found.image, self.surface.F, found.torus.R).bad)
 
     def _chart(self, ratio: Ratio | float, shape: float = 0.0) -> AreaMap:
         steps = Steps(0, _TOL, math.inf)
         route = Route(self.phase, ratio, _SEM_STEPS, "none", steps, shape)
-        return along(route, self.surface, self.conformal, self.progress)
+        return charted(route, self.equal, self.conformal, self.progress)

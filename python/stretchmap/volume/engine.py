@@ -162,7 +162,11 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     """Inverted tets, and tets at folded faces, that are left."""
     history = run.history
     stuck, opened = _untangle_inside(run), None
-    if glide:
+    if glide and not len(stuck):
+        # A few folded faces are a matter of what is round them; for their sake all the rest would
+        # be turned over once more.
+        stuck = _patched(run, glide=True)
+    if glide and len(stuck):
         run.x = opened = untangle_whole(history.model, run.x, history, glide=True).x
         stuck = _patched(run, glide=True)
     best, fewest, least = run.problem, len(stuck), _inverted(run)

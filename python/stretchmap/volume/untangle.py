@@ -93,11 +93,13 @@ def _continue(
     """Follow the worst determinant down with epsilon; ``enough(left, since)`` ends it."""
     state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
     left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
-    epsilon = min(max(0.2 * abs(worst), 10.0 * floor), _WIDEST)
+    # A better worst tet is not worth turning others over for long.
+    clean = left == 0
+    epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), _WIDEST)
     patience = Patience(left, worst)
     best = Untangled(x, left, worst)
     for iteration in range(1, steps + 1):
-        if left == 0 and (worst >= floor or patience.since >= _ENOUGH):
+        if (left == 0 and worst >= floor) or ((clean or left == 0) and patience.since >= _ENOUGH):
             break
         if (left and enough(left, patience.since)) or budget.spent:
             break

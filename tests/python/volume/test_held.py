@@ -129,10 +129,11 @@ def test_the_first_start_has_no_folded_face_if_that_can_be_had(monkeypatch):
     folded = sm.certify(SOLID.surface, plain.image * [1.0, 1.0, -1.0], plain.torus)
     folded = dataclasses.replace(folded, ids={"boundary_oriented": (0,)})
     found = dataclasses.replace(plain, certificate=folded)
-    monkeypatch.setattr(boundary_starts_module, "along", lambda *_: found)
+    monkeypatch.setattr(boundary_starts_module, "charted", lambda *_: found)
     starts = list(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
-    assert [start.certificate.certified for start in starts] == [True, True, False, True]
-    assert starts[2] is found
+    proven = [start.certificate.certified for start in starts]
+    assert proven == [True, True, True, True, False, True]
+    assert starts[4] is found
 
 
 def test_the_second_start_has_a_fatter_torus_unless_its_ratio_is_given():
@@ -248,16 +249,17 @@ def test_if_all_starts_hold_some_the_lowest_energy_counts(monkeypatch):
 @pytest.mark.parametrize(("share", "unfolded"), [(1e-3, True), (5e-2, False)])
 def test_a_boundary_with_too_many_folded_faces_is_not_unfolded(monkeypatch, share, unfolded):
     plain = sm.area_map(SOLID.surface, finish="none", ratio="search")
-    ids = {"boundary_graph": tuple(range(int(share * len(SOLID.surface.F)) + 1))}
-    certificate = dataclasses.replace(plain.certificate, certified=False, ids=ids)
+    certificate = dataclasses.replace(plain.certificate, certified=False)
     folded = dataclasses.replace(plain, certificate=certificate)
+    maps = boundary_starts_module._BoundaryMaps
+    monkeypatch.setattr(maps, "_not_outward", lambda *_: int(share * len(SOLID.surface.F)) + 1)
     turned = []
 
     def finished(start, **_):
         turned.append(start)
         return plain
 
-    monkeypatch.setattr(boundary_starts_module, "along", lambda *_: folded)
+    monkeypatch.setattr(boundary_starts_module, "charted", lambda *_: folded)
     monkeypatch.setattr(boundary_starts_module, "finished", finished)
     next(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
     assert bool(turned) == unfolded

@@ -11,6 +11,8 @@ import pytest
 
 import stretchmap as sm
 from shapes import mug
+from stretchmap.area import route
+from stretchmap.area.balance import balance_areas
 from stretchmap.errors import SolverError
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import certified
@@ -171,6 +173,7 @@ def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch, plain):
 
     maps = boundary_starts_module._BoundaryMaps(SOLID.surface, VolumeOptions(), None)
     monkeypatch.setattr(boundary_starts_module, "finished", lambda found, **_: (found.shape,))
+    monkeypatch.setattr(type(maps), "_not_outward", lambda *_: 1)
     monkeypatch.setattr(type(maps), "_chart", chart(1e-3))
     assert maps.gentle(2.0).shape == 100.0
     monkeypatch.setattr(type(maps), "_chart", chart(1e-20))
@@ -191,7 +194,43 @@ def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch):
     made = maps(SOLID.surface, VolumeOptions(), None)
     monkeypatch.setattr(maps, "_chart", chart)
     assert made.gentle_on_fatter().ratio == 3.75
-    assert tried == [(1.0, 100.0), (1.0, 1000.0), (1.6, 100.0), (2.5, 100.0)]
+    assert tried == [(1.0, 100.0), (1.0, 1000.0), (1.6, 100.0), (1.6, 1000.0), (2.5, 100.0)]
+
+
+def test_where_kept_shapes_fold_on_every_torus_the_folded_faces_are_turned(monkeypatch):
+    def chart(_, ratio, shape=0.0):
+        certified = SimpleNamespace(certified=False)
+        kept = SimpleNamespace(ratios=np.ones(1))
+        return SimpleNamespace(ratio=ratio, shape=shape, certificate=certified, distortion=kept)
+
+    def finished(found, **_):
+        found.history = [SimpleNamespace(flips=int(found.ratio < 2.0))]
+        return found
+
+    maps = boundary_starts_module._BoundaryMaps
+    monkeypatch.setattr(maps, "fatter_ratio", 1.5)
+    made = maps(SOLID.surface, VolumeOptions(), None)
+    monkeypatch.setattr(maps, "_chart", chart)
+    monkeypatch.setattr(maps, "_not_outward", lambda *_: 1)
+    monkeypatch.setattr(boundary_starts_module, "finished", finished)
+    found = made.gentle_on_fatter()
+    assert (found.ratio, found.shape) == (1.6 * 1.5, 1000.0)
+    monkeypatch.setattr(maps, "_not_outward", lambda *_: len(SOLID.surface.F))
+    assert made.gentle_on_fatter() is None
+
+
+def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
+    made = boundary_starts_module._BoundaryMaps(SOLID.surface, VolumeOptions(), None)
+    weights = []
+
+    def balanced(level, shape, progress):
+        weights.append(shape)
+        return balance_areas(level, shape, progress)
+
+    monkeypatch.setattr(route, "balance_areas", balanced)
+    charts = [made._chart(ratio, shape) for shape in (100.0, 1e3) for ratio in (2.0, 3.0)]
+    assert weights == [100.0, 1e3]
+    assert [chart.torus.ratio for chart in charts] == pytest.approx([2.0, 3.0] * 2)
 
 
 @pytest.mark.parametrize("folded", [True, False])

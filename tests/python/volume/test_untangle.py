@@ -1,4 +1,4 @@
-"""How fast epsilon follows the worst determinant down."""
+"""How fast epsilon follows the worst determinant down, and what is untangled in which order."""
 
 from __future__ import annotations
 
@@ -7,19 +7,27 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import stretchmap as sm
+from stretchmap.volume import engine
 from stretchmap.volume.budget import Budget
-from stretchmap.volume.untangle import _continue
+from stretchmap.volume.model import History
+from stretchmap.volume.options import VolumeOptions
+from stretchmap.volume.problem import VolumeProblem
+from stretchmap.volume.start import started
+from stretchmap.volume.untangle import Untangled, _continue
 
 
 class Dragging:
-    """A minimizer whose whole steps leave a few tets inverted and no energy to gain."""
+    """A minimizer whose steps leave as many tets inverted and no energy to gain."""
 
-    def __init__(self, left: int, alpha: float) -> None:
-        self.left, self.alpha = left, alpha
+    def __init__(self, left: int, alpha: float = 1.0, worst: float = -0.01) -> None:
+        self.left, self.alpha, self.worst = left, alpha, worst
         self.epsilons: list[float] = []
 
     def value(self, _x, _weights):
-        return SimpleNamespace(energy=1.0, flips=self.left, folds=0, min_det=-0.01, min_facing=1.0)
+        return SimpleNamespace(
+            energy=1.0, flips=self.left, folds=0, min_det=self.worst, min_facing=1.0
+        )
 
     def step(self, x, weights, _linear):
         self.epsilons.append(weights.epsilon)
@@ -48,3 +56,48 @@ def test_what_drags_on_with_few_tets_left_is_hurried():
 )
 def test_all_else_goes_the_published_pace(given):
     assert paces(**given) == pytest.approx(0.9)
+
+
+class Breeding(Dragging):
+    """One whose every step turns a tet over."""
+
+    def step(self, x, weights, linear):
+        self.left, self.worst = 1, -0.01
+        return super().step(x, weights, linear)
+
+
+@pytest.mark.parametrize("kind", [Dragging, Breeding])
+def test_what_is_untangled_is_not_turned_over_for_a_better_worst_tet(kind):
+    newton = kind(0, worst=1e-4)
+    found = _continue(
+        newton, np.zeros((1, 3)), face=1.0, floor=0.02, steps=100,
+        enough=lambda _left, _since: False, linear=None, budget=Budget(60.0),
+    )  # fmt: skip
+    assert (found.left, found.worst) == (0, 1e-4)
+    assert newton.epsilons[0] == 0.02 and len(newton.epsilons) <= 7
+
+
+@pytest.mark.parametrize("folded", [0, 5])
+def test_few_folded_faces_are_unfolded_with_what_is_round_them(monkeypatch, folded):
+    solid = sm.samples.bumpy_torus(600)
+    plain = sm.area_map(solid.surface, finish="none")
+    problem = started(VolumeProblem.of(solid, plain.image, torus=plain.torus), solver="auto")
+    budget = Budget(60.0)
+    run = engine._Run(
+        problem, VolumeOptions(), History(problem.model(VolumeOptions()), budget), budget
+    )
+    done, left = [], [folded, 0]
+
+    def patched(run, *, glide):
+        done.append("patches")
+        return np.arange(left.pop(0))
+
+    def whole(model, x, history, *, glide):
+        done.append("whole")
+        return Untangled(x, 0, 1.0)
+
+    monkeypatch.setattr(engine, "_untangle_inside", lambda run: np.arange(0))
+    monkeypatch.setattr(engine, "_patched", patched)
+    monkeypatch.setattr(engine, "untangle_whole", whole)
+    assert engine._untangle(run, glide=True) == 0
+    assert done == (["patches", "whole", "patches"] if folded else ["patches", "whole"])
