@@ -3,10 +3,9 @@
     python bench/scaling.py [CASE ...] [--method certified|vsem] [--json FILE] [--write]
 
 A case is a file of a mesh or a number of tets of a generated solid torus. The map is made with two
-threads that sleep while they have nothing to do. Then the processor time of the first is what is
-serial and half of what is parallel, that of the second the other half: their difference is the
-serial part, whoever else uses the machine. A stage ends when its last step is reported; what leads
-to its first step counts with it.
+threads. The core counts the processor time that the first spends in loops that it shares; the rest
+of its time is serial, whoever else uses the machine. A stage ends when its last step is reported;
+what leads to its first step counts with it.
 """
 
 from __future__ import annotations
@@ -31,15 +30,18 @@ class Stages:
 
     @staticmethod
     def _now() -> tuple[float, float, float]:
-        return time.perf_counter(), time.process_time(), time.thread_time()
+        from stretchmap import _core
+
+        alone = time.thread_time() - _core.base.shared_seconds()
+        return time.perf_counter(), time.process_time(), alone
 
     def __call__(self, stage: str, done: int, total: int, **values: float) -> None:
         now = self._now()
-        wall, both, first = (b - a for a, b in zip(self._then, now, strict=True))
+        wall, both, alone = (b - a for a, b in zip(self._then, now, strict=True))
         row = self.rows.setdefault(stage, {"wall": 0.0, "processor": 0.0, "serial": 0.0})
         row["wall"] += wall
         row["processor"] += both
-        row["serial"] += max(first - (both - first), 0.0)
+        row["serial"] += alone
         self._then = now
 
 

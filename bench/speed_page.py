@@ -34,7 +34,8 @@ def run_worker(
 ) -> dict[str, Any]:
     """The row a script prints last, run by itself as ``--worker`` with the package of a folder.
 
-    Its threads sleep while they have nothing to do, so that processor time is that of work.
+    Threads sleep while they have nothing to do, OpenMP's of earlier versions as well, so that
+    processor time is that of work.
     """
     environment = {
         **os.environ,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "stretchmap/area/chart.hpp"
@@ -104,14 +106,17 @@ class TubeTable {
 std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
                                             const FacesRef& faces, const Points2Ref& turns,
                                             const Points2Ref& candidates) {
-  std::map<double, TubeTable> tables;
-  for (Index i = 0; i < static_cast<Index>(candidates.rows()); ++i)
-    tables.try_emplace(candidates(i, 1), candidates(i, 1));
+  std::map<double, std::optional<TubeTable>> by_ratio;
+  for (Index i = 0; i < static_cast<Index>(candidates.rows()); ++i) by_ratio[candidates(i, 1)];
+  std::vector<std::pair<const double, std::optional<TubeTable>>*> tables;
+  for (auto& table : by_ratio) tables.push_back(&table);
+  for_tasks(static_cast<Index>(tables.size()),
+            [&](Index k) { tables[k]->second.emplace(tables[k]->first); });
   const Eigen::ArrayXd u = kTwoPi * turns.col(0).array();
   const Eigen::ArrayXd cos_u = u.cos(), sin_u = u.sin();
   std::vector<SurfaceQuality> result(static_cast<std::size_t>(candidates.rows()));
   for_tasks(static_cast<Index>(candidates.rows()), [&](Index i) {
-    const TubeTable& table = tables.at(candidates(i, 1));
+    const TubeTable& table = *by_ratio.at(candidates(i, 1));
     Points image(turns.rows(), 3);
     for (Index k = 0; k < static_cast<Index>(turns.rows()); ++k) {
       const Eigen::RowVector2d tube = table.at(turns(k, 1) + candidates(i, 0));

@@ -4,8 +4,12 @@
 #include <array>
 #include <cstdint>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::mesh {
 namespace {
+
+constexpr Index kBetweenPolls = 65536;  // vertices
 
 // All but the lowest vertex of a facet in ascending order, packed, and the facet.
 template <std::size_t N>
@@ -66,13 +70,23 @@ FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used, 
   FacetGroups groups;
   groups.order.resize(keys.size());
   groups.start.reserve(keys.size() / 2 + 1);
-  for (Index i = 0; i < n_vertices; ++i) {
-    now_and_then(i, 16384);
-    std::sort(keys.begin() + bucket[i], keys.begin() + bucket[i + 1]);
-    for (Index p = bucket[i]; p < bucket[i + 1]; ++p) {
-      if (p == bucket[i] || !keys[p].same(keys[p - 1])) groups.start.push_back(p);
-      groups.order[p] = keys[p].facet;
-    }
+  std::vector<std::vector<Index>> starts(chunk_count(kBetweenPolls, kElementChunk));
+  for (Index first = 0; first < n_vertices; first += kBetweenPolls) {
+    if (poll) poll();
+    const Index count = std::min(kBetweenPolls, n_vertices - first);
+    for_chunks(count, kElementChunk, [&](Index begin, Index end) {
+      std::vector<Index>& start = starts[begin / kElementChunk];
+      start.clear();
+      for (Index i = first + begin; i < first + end; ++i) {
+        std::sort(keys.begin() + bucket[i], keys.begin() + bucket[i + 1]);
+        for (Index p = bucket[i]; p < bucket[i + 1]; ++p) {
+          if (p == bucket[i] || !keys[p].same(keys[p - 1])) start.push_back(p);
+          groups.order[p] = keys[p].facet;
+        }
+      }
+    });
+    for (Index c = 0; c < chunk_count(count, kElementChunk); ++c)
+      groups.start.insert(groups.start.end(), starts[c].begin(), starts[c].end());
   }
   groups.start.push_back(static_cast<Index>(keys.size()));
   return groups;

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <vector>
 
 #include "stretchmap/base/parallel.hpp"
 
@@ -20,10 +22,11 @@ using Block = Eigen::Map<Block3>;
 double blocked_sum(const Vec& values) {
   constexpr Index kBlock = 4096;
   const Index n = static_cast<Index>(values.size());
-  double sum = 0.0;
-  for (Index first = 0; first < n; first += kBlock)
-    sum += values.segment(first, std::min(kBlock, n - first)).sum();
-  return sum;
+  std::vector<double> sums(chunk_count(n, kBlock));
+  for_chunks(n, kBlock, [&](Index begin, Index end) {
+    sums[begin / kBlock] = values.segment(begin, end - begin).sum();
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
 // to += block, two numbers at a time.
@@ -60,11 +63,11 @@ void SolidEnergy::for_batches(const PointsRef& x, const EnergyWeights& w, Index 
 void SolidEnergy::set_targets(const VecRef& target) {
   const Index k = static_cast<Index>(tets_.rows());
   if (target_.size() == 0) target_.setOnes(k);
-  for (Index t = 0; t < k; ++t) {
+  for_rows(k, [&](Index t) {
     const double wanted = target[order_[t]];
     rest_.row(t) *= std::cbrt(target_[t] / wanted);
     target_[t] = wanted;
-  }
+  });
 }
 
 SolidEnergy::Energies SolidEnergy::energies(const PointsRef& x, const EnergyWeights& w) const {

@@ -40,15 +40,15 @@ class RowSet {
 // Rows of a pattern, collect(row, set) adding the columns of each.
 template <class Collect>
 Pattern build_pattern(Index rows, Index columns, const Collect& collect) {
-  const Index chunks = chunk_count(rows);
+  const Index chunks = chunk_count(rows, kElementChunk);
   std::vector<std::vector<Index>> parts(static_cast<std::size_t>(chunks));
   Pattern pattern;
   pattern.columns = columns;
   pattern.start.assign(static_cast<std::size_t>(rows) + 1, 0);
   for_chunks_with(
-      rows, kChunk, [&] { return RowSet(columns); },
+      rows, kElementChunk, [&] { return RowSet(columns); },
       [&](Index begin, Index end, RowSet& set) {
-        std::vector<Index>& part = parts[begin / kChunk];
+        std::vector<Index>& part = parts[begin / kElementChunk];
         for (Index i = begin; i < end; ++i) {
           set.begin(i);
           collect(i, set);
@@ -59,8 +59,8 @@ Pattern build_pattern(Index rows, Index columns, const Collect& collect) {
       });
   for (Index i = 0; i < rows; ++i) pattern.start[i + 1] += pattern.start[i];
   pattern.col.resize(static_cast<std::size_t>(pattern.start[rows]));
-  for_chunks(rows, [&](Index begin, Index) {
-    const std::vector<Index>& part = parts[begin / kChunk];
+  for_chunks(rows, kElementChunk, [&](Index begin, Index) {
+    const std::vector<Index>& part = parts[begin / kElementChunk];
     std::copy(part.begin(), part.end(), pattern.col.begin() + pattern.start[begin]);
   });
   return pattern;

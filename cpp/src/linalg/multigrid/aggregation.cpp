@@ -17,13 +17,13 @@ double coupling(const LevelMatrix<B>& A, Index e) {
 template <int B>
 std::vector<char> strong_entries(const LevelMatrix<B>& A, double threshold) {
   std::vector<double> largest(A.n, 0.0);
-  for_chunks(A.n, [&](Index begin, Index end) {
+  for_chunks(A.n, LevelMatrix<B>::kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
       for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
         largest[i] = std::max(largest[i], coupling<B>(A, e));
   });
   std::vector<char> strong(A.col.size(), 0);
-  for_chunks(A.n, [&](Index begin, Index end) {
+  for_chunks(A.n, LevelMatrix<B>::kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
       for (Index e = A.start[i]; e < A.start[i + 1]; ++e) {
         const double c = coupling<B>(A, e);

@@ -94,7 +94,7 @@ void LevelMatrix<B>::set_sweep_pattern() {
     entries->col.resize(count);
     entries->value.resize(static_cast<size_t>(B * B) * count + kPadding);
   }
-  for_chunks(n, [&](Index begin, Index end) {
+  for_chunks(n, kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
       for_sweep_entries(i, [&](SweepEntries& to, Index at, Index e) { to.col[at] = col[e]; });
   });
@@ -106,7 +106,7 @@ std::vector<Index> LevelMatrix<B>::set_values(const double* given, double factor
   values = given;
   scale = factor;
   diagonal.resize(kSize * n);
-  for_chunks(n, [&](Index begin, Index end) {
+  for_chunks(n, kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       for (size_t k = 0; k < kSize; ++k)
         diagonal[kSize * i + k] = scale * values[kSize * diagonal_source[i] + k];
@@ -128,7 +128,7 @@ std::vector<Index> LevelMatrix<B>::set_diagonals() {
   constexpr size_t kSize = B * B;
   inverse_f.resize(kSize * n + kPadding);
   std::vector<char> bad(n, 0);
-  for_chunks(n, [&](Index begin, Index end) {
+  for_chunks(n, kRows, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
       Eigen::Map<RowBlock<double, B>> block(diagonal.data() + kSize * i);
       ColBlock<double, B> inverse = ColBlock<double, B>::Zero();
@@ -155,7 +155,7 @@ void LevelMatrix<B>::set_excess() {
   const auto size_of = [&](Index i) {
     return Eigen::Map<const RowBlock<double, B>>(diagonal.data() + kSize * i).trace() / B;
   };
-  for_chunks(n, [&](Index begin, Index end) {
+  for_chunks(n, kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       if (lower[i] == start[i]) continue;
       double coupling = 0.0;

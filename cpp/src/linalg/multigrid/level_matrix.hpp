@@ -26,8 +26,9 @@ struct SweepEntries {
 
 template <int B>
 struct LevelMatrix {
-  Index n = 0;      // block rows
-  Index chunk = 0;  // block rows per chunk
+  Index n = 0;                                      // block rows
+  Index chunk = 0;                                  // block rows per chunk
+  static constexpr Index kRows = kChunk / (B * B);  // at once, where chunks do not matter
   // Entries of row i: [start[i], lower[i]) other chunks, [lower[i], upper[i]) earlier columns,
   // [upper[i], start[i + 1]) later columns.
   std::vector<Index> start, lower, upper, col;

@@ -1,5 +1,6 @@
 // The single-precision part of a level matrix.
 #include <Eigen/Core>
+#include <algorithm>
 
 #include "linalg/multigrid/level_matrix.hpp"
 
@@ -59,7 +60,7 @@ template <int B>
 template <int K>
 void LevelMatrix<B>::divide_by_diagonal(const float* r, float* z) const {
   constexpr size_t kBlock = B * B, kRow = B * K;
-  for_chunks(n, [&](Index begin, Index end) {
+  for_chunks(n, kRows, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {
       const RowSum<B, K> row(r + kRow * i);
       row.store(row.transform(inverse_f.data() + kBlock * i, row.total()), z + kRow * i);
@@ -75,7 +76,8 @@ void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
     for (Index e = from.start[i]; e < from.start[i + 1]; ++e)
       row.subtract(from.value.data() + kBlock * e, x + kRow * from.col[e]);
   };
-  for_chunks(n, chunk, [&](Index begin, Index end) {
+  for_tasks(chunk_count(n, chunk), [&](Index c) {
+    const Index begin = c * chunk, end = std::min(n, begin + chunk);
     for (Index i = begin; i < end; ++i) {
       RowSum<B, K> row(b + kRow * i);
       subtract(earlier, i, row);
@@ -83,7 +85,7 @@ void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
     }
   });
   // The sweep solved the earlier columns and the diagonal exactly; the rest is the residual.
-  for_chunks(n, [&](Index begin, Index end) {
+  for_chunks(n, kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       RowSum<B, K> row;
       subtract(rest, i, row);
@@ -102,7 +104,8 @@ template <int B>
 template <int K>
 void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) const {
   constexpr size_t kBlock = B * B, kRow = B * K;
-  for_chunks(n, chunk, [&](Index begin, Index end) {
+  for_tasks(chunk_count(n, chunk), [&](Index c) {
+    const Index begin = c * chunk, end = std::min(n, begin + chunk);
     for (Index i = end - 1; i >= begin; --i) {
       // Backwards through memory, too; the nearest row, whose result was written last, at the
       // end of what waits for such.
@@ -123,7 +126,7 @@ void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) co
 template <int B>
 void LevelMatrix<B>::scaled_multiply(const float* x, float* y) const {
   constexpr size_t kBlock = B * B, kRow = B;
-  for_chunks(n, [&](Index begin, Index end) {
+  for_chunks(n, kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       RowSum<B, 1> row;
       for (const SweepEntries* from : {&earlier, &rest})

@@ -70,7 +70,7 @@ std::vector<double> Transfer<B, K>::orthonormal(Index n, const std::vector<doubl
   }
   const Pattern members = transpose(member_rows).first;
   std::vector<double> coarse_modes(static_cast<size_t>(K) * K * aggregates.count, 0.0);
-  for_chunks(aggregates.count, [&](Index begin, Index end) {
+  for_chunks(aggregates.count, kCostlyChunk, [&](Index begin, Index end) {
     for (Index a = begin; a < end; ++a) {
       const auto dot = [&](int c, int d) {
         double sum = 0.0;
@@ -180,9 +180,9 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
     }
   };
   for_chunks_with(
-      A.n, kChunk, [&] { return std::vector<Index>(aggregates.count); }, rows);
+      A.n, LevelMatrix<B>::kRows, [&] { return std::vector<Index>(aggregates.count); }, rows);
   r_value.resize(p_value.size());
-  for_chunks(r.rows(), [&](Index begin, Index end) {
+  for_chunks(r.rows(), kChunk / 16, [&](Index begin, Index end) {
     for (size_t e = r.start[begin]; e < static_cast<size_t>(r.start[end]); ++e)
       for (size_t k = 0; k < kSize; ++k) r_value[kSize * e + k] = p_value[kSize * r_entry[e] + k];
   });
@@ -206,10 +206,12 @@ template <int B, int K>
 void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index last,
                                    std::vector<double>& product) const {
   constexpr size_t kSize = static_cast<size_t>(B) * K;
-  product.assign(kSize * (ap.start[last] - ap.start[first]) + 1, 0.0);  // see add_block_products
+  const auto at = [&](Index i) { return kSize * (ap.start[i] - ap.start[first]); };
+  product.resize(at(last) + 1);  // see add_block_products
   for_chunks_with(
       last - first, kChunk / 8, [&] { return std::vector<Index>(aggregates.count); },
       [&](Index begin, Index end, std::vector<Index>& slot) {
+        std::fill(product.data() + at(first + begin), product.data() + at(first + end), 0.0);
         for (Index i = first + begin; i < first + end; ++i) {
           for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e)
             slot[ap.col[e]] = e - ap.start[first];
@@ -305,7 +307,7 @@ template <int B, int K>
 template <int N>
 void Transfer<B, K>::prolong_add(const float* c, const float* x, float* y) const {
   static_assert(N == 1 || (B == 1 && K == 1));
-  for_chunks(p.rows(), [&](Index begin, Index end) {
+  for_chunks(p.rows(), kChunk / (B * K), [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       if constexpr (N > 1) {
         Lanes<float, N> total = lanes<N>(x + static_cast<size_t>(N) * i);
