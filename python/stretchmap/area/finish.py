@@ -28,14 +28,14 @@ _MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings
 _FAIR = 2.0  # from this face SD on, in units of tol, the shape budget counts
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 
-_UNFOLD_STEPS = 100
+UNFOLD_STEPS = 100
 _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing any more
 _EPSILON = 0.2  # of the worst face
 _LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
 
 
 def unfold_faces(
-    newton: _core.area.SurfaceNewton, progress: Progress | None
+    newton: _core.area.SurfaceNewton, progress: Progress | None, steps: int = UNFOLD_STEPS
 ) -> list[IterationRecord]:
     """Newton steps on the regularized energy until every face looks outward, or no step is left.
 
@@ -44,14 +44,14 @@ def unfold_faces(
     start = time.perf_counter()
     history: list[IterationRecord] = []
     short = 0
-    for iteration in range(_UNFOLD_STEPS):
+    for iteration in range(steps):
         facing = newton.least_facing()
         if facing > 0.0:
             break
         epsilon = min(max(-_EPSILON * facing, _LEAST_EPSILON), _MOST_EPSILON)
         taken = newton.step(_weights(1.0, _FACING, epsilon))
         history.append(_record("untangle", iteration + 1, taken, newton.measures(), start))
-        report(progress, "area", iteration, _UNFOLD_STEPS, flips=history[-1].flips)
+        report(progress, "area", iteration, steps, flips=history[-1].flips)
         short = short + 1 if taken.step < _SHORT else 0
         if taken.step == 0.0 or short == _JAMMED:
             break

@@ -19,7 +19,7 @@ from ..errors import CertificationError, OptionError, SolverError
 from ..homology.basis import HomologyBasis
 from ..mesh.given import as_surface, require_same_mesh
 from .coarse import Level, levels
-from .finish import Steps, finish_areas, unfold_faces
+from .finish import UNFOLD_STEPS, Steps, finish_areas, unfold_faces
 from .flat import unfolded_turns
 from .result import AreaMap
 from .route import EqualAreas, Finish, Made, Route, follow
@@ -266,13 +266,18 @@ def _start(
 
 
 def finished(
-    start: AreaMap, *, max_iter: int, tol: float, progress: Progress | None = None
+    start: AreaMap,
+    *,
+    max_iter: int,
+    tol: float,
+    progress: Progress | None = None,
+    unfold_iter: int = UNFOLD_STEPS,
 ) -> AreaMap:
     """An unfinished map with its folded faces turned, and up to ``max_iter`` steps on the areas."""
     clock = time.perf_counter()
     level = Level.of(start.mesh, start.angles / TWO_PI, start.forms, start.ratio)
     newton = level.newton(start.angles, start.ratio)
-    unfolding = unfold_faces(newton, progress)
+    unfolding = unfold_faces(newton, progress, unfold_iter)
     steps = Steps(max_iter, tol, math.inf)
     records, converged, reason = finish_areas(newton, False, steps, progress)
     image = start.torus.xi(newton.angles[:, 0], newton.angles[:, 1])

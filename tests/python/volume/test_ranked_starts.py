@@ -217,6 +217,16 @@ def test_where_kept_shapes_fold_on_every_torus_the_folded_faces_are_turned(monke
     assert (found.ratio, found.shape) == (1.6 * 1.5, 1000.0)
     monkeypatch.setattr(maps, "_not_outward", lambda *_: len(SOLID.surface.F))
     assert made.gentle_on_fatter() is None
+    certified = SimpleNamespace(certified=True)
+
+    def heavier(_, ratio, shape=0.0):
+        found = chart(_, ratio, shape)
+        found.certificate = certified if shape > 1e3 and ratio > 3.0 else found.certificate
+        return found
+
+    monkeypatch.setattr(maps, "_chart", heavier)
+    found = made.gentle_on_fatter()
+    assert (found.ratio, found.shape) == (2.5 * 1.5, 1e4)
 
 
 def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
