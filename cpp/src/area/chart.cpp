@@ -36,12 +36,12 @@ SurfaceChart surface_chart(const mesh::SurfaceTopology& top, const IndexRows& fo
 
 Vec turn_areas(const SurfaceChart& chart, const Points2Ref& turns) {
   Vec areas(chart.faces.rows());
-  for (Index f = 0; f < areas.size(); ++f) {
+  for_rows(static_cast<Index>(areas.size()), [&](Index f) {
     const Eigen::Vector2d p = chart.corner(turns, f, 0);
     const Eigen::Vector2d a = chart.corner(turns, f, 1) - p;
     const Eigen::Vector2d b = chart.corner(turns, f, 2) - p;
     areas(f) = 0.5 * cross(a, b);
-  }
+  });
   return areas;
 }
 
@@ -55,7 +55,7 @@ std::vector<Index> folded_faces(const SurfaceChart& chart, const Points2Ref& tur
 
 double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,
                      const Points2Ref& direction, double share, double longest) {
-  for (Index f = 0; f < chart.faces.rows(); ++f) {
+  return least_of(static_cast<Index>(chart.faces.rows()), longest, [&](Index f) {
     const Eigen::Vector2d p = chart.corner(turns, f, 0);
     const Eigen::Vector2d a = chart.corner(turns, f, 1) - p, b = chart.corner(turns, f, 2) - p;
     const auto way = [&](int k) -> Eigen::Vector2d {
@@ -63,11 +63,10 @@ double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,
     };
     const Eigen::Vector2d da = way(1), db = way(2);
     const double now = cross(a, b);
-    if (!(now > 0.0)) continue;
+    if (!(now > 0.0)) return longest;
     const double linear = cross(da, b) + cross(a, db), quadratic = cross(da, db);
-    longest = std::min(longest, share * first_root(now, linear, quadratic));
-  }
-  return longest;
+    return share * first_root(now, linear, quadratic);
+  });
 }
 
 Vec equal_area_from_angle(const VecRef& v, double tube_ratio) {

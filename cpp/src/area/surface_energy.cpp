@@ -202,32 +202,30 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
 Points glide_image(const GlideProblem& problem, const Points2Ref& angles) {
   const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Points image(angles.rows(), 3);
-  for (Index i = 0; i < static_cast<Index>(image.rows()); ++i) image.row(i) = points[i].point;
+  for_rows(static_cast<Index>(image.rows()), [&](Index i) { image.row(i) = points[i].point; });
   return image;
 }
 
 double least_facing(const GlideProblem& problem, const Points2Ref& angles) {
   const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   const Torus torus = problem.torus();
-  double least = std::numeric_limits<double>::infinity();
-  for (Index f = 0; f < problem.chart.faces.rows(); ++f) {
+  const double far = std::numeric_limits<double>::infinity();
+  return least_of(static_cast<Index>(problem.chart.faces.rows()), far, [&](Index f) {
     TorusPoint p[3];
     for (int k = 0; k < 3; ++k) p[k] = points[problem.chart.faces(f, k)];
-    const double value = facing(p, torus, false).least.value;
-    least = std::min(least, value / problem.reference.areas(f));
-  }
-  return least;
+    return facing(p, torus, false).least.value / problem.reference.areas(f);
+  });
 }
 
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles) {
   const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Vec areas(problem.chart.faces.rows());
-  for (Index f = 0; f < areas.size(); ++f) {
+  for_rows(static_cast<Index>(areas.size()), [&](Index f) {
     const Eigen::Vector3d p = points[problem.chart.faces(f, 0)].point;
     const Eigen::Vector3d a = points[problem.chart.faces(f, 1)].point - p;
     const Eigen::Vector3d b = points[problem.chart.faces(f, 2)].point - p;
     areas(f) = 0.5 * a.cross(b).norm();
-  }
+  });
   return areas;
 }
 

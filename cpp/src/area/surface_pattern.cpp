@@ -2,62 +2,58 @@
 
 #include <algorithm>
 
+#include "stretchmap/base/parallel.hpp"
+#include "stretchmap/linalg/pattern.hpp"
+
 namespace stretchmap::area {
 
-namespace {
-
-// Each vertex and its neighbors, ascending.
-std::vector<std::vector<Index>> adjacency(const FacesRef& faces, Index n) {
-  std::vector<std::vector<Index>> rows(static_cast<std::size_t>(n));
-  for (Index f = 0; f < faces.rows(); ++f)
-    for (int k = 0; k < 3; ++k)
-      for (int l = 0; l < 3; ++l) rows[faces(f, k)].push_back(faces(f, l));
-  for (auto& row : rows) {
-    std::sort(row.begin(), row.end());
-    row.erase(std::unique(row.begin(), row.end()), row.end());
-  }
-  return rows;
-}
-
-}  // namespace
-
 SurfacePattern::SurfacePattern(const FacesRef& faces, Index n, int block)
-    : zeros_(n * block, n * block) {
-  const auto rows = adjacency(faces, n);
-  std::vector<Index> start(static_cast<std::size_t>(n) + 1, 0);
-  for (Index i = 0; i < n; ++i)
-    start[i + 1] = start[i] + block * block * static_cast<Index>(rows[i].size());
-  zeros_.resizeNonZeros(start[n]);
-  std::fill_n(zeros_.valuePtr(), start[n], 0.0);
-  for (Index i = 0; i < n; ++i) {
-    const Index width = block * static_cast<Index>(rows[i].size());
+    : block_(block), zeros_(n * block, n * block), corners_(corners_at(faces, n)) {
+  const linalg::Pattern rows = linalg::build_pattern(n, n, [&](Index i, linalg::RowSet& set) {
+    for (const Index corner : corners_[i])
+      for (int l = 0; l < 3; ++l) set.add(faces(corner / 3, l));
+  });
+  const Index entries = 3 * block * block;  // of a face in the rows of one of its vertices
+  zeros_.resizeNonZeros(block * block * rows.start[n]);
+  slot_.resize(static_cast<std::size_t>(faces.rows()) * 3 * entries);
+  zeros_.outerIndexPtr()[0] = 0;
+  for_rows(n, kElementChunk, [&](Index i) {
+    const auto first = rows.col.begin() + rows.start[i],
+               last = rows.col.begin() + rows.start[i + 1];
+    const Index start = block * block * rows.start[i];
+    const Index width = block * static_cast<Index>(last - first);
     for (int c = 0; c < block; ++c) {
-      zeros_.outerIndexPtr()[block * i + c] = start[i] + c * width;
-      for (Index e = 0; e < width; ++e)
-        zeros_.innerIndexPtr()[start[i] + c * width + e] = block * rows[i][e / block] + e % block;
+      zeros_.outerIndexPtr()[block * i + c + 1] = start + (c + 1) * width;
+      for (Index e = 0; e < width; ++e) {
+        zeros_.innerIndexPtr()[start + c * width + e] = block * first[e / block] + e % block;
+        zeros_.valuePtr()[start + c * width + e] = 0.0;
+      }
     }
-  }
-  zeros_.outerIndexPtr()[n * block] = start[n];
-
-  slot_.reserve(static_cast<std::size_t>(faces.rows()) * 9 * block * block);
-  for (Index f = 0; f < faces.rows(); ++f)
-    for (int k = 0; k < 3; ++k) {
-      const auto& row = rows[faces(f, k)];
-      const Index width = block * static_cast<Index>(row.size());
+    for (const Index corner : corners_[i]) {
+      Index* slot = slot_.data() + static_cast<std::size_t>(corner) * entries;
       for (int c = 0; c < block; ++c)
         for (int l = 0; l < 3; ++l) {
-          const auto found = std::lower_bound(row.begin(), row.end(), faces(f, l));
-          const Index column = block * static_cast<Index>(found - row.begin());
+          const auto found = std::lower_bound(first, last, faces(corner / 3, l));
           for (int d = 0; d < block; ++d)
-            slot_.push_back(start[faces(f, k)] + c * width + column + d);
+            *slot++ = start + c * width + block * static_cast<Index>(found - first) + d;
         }
     }
+  });
 }
 
+// Row by row, so that threads share them.
 void SurfacePattern::scatter(const RowsRef& elements, double* values) const {
-  std::fill_n(values, zeros_.nonZeros(), 0.0);
-  const double* entry = elements.data();
-  for (const Index slot : slot_) values[slot] += *entry++;
+  const Index entries = 3 * block_ * block_;
+  const Index* start = zeros_.outerIndexPtr();
+  for_rows(static_cast<Index>(zeros_.rows()) / block_, kElementChunk, [&](Index i) {
+    std::fill(values + start[block_ * i], values + start[block_ * (i + 1)], 0.0);
+    for (const Index corner : corners_[i]) {
+      const auto first = static_cast<std::size_t>(corner) * entries;
+      const double* entry = elements.data() + first;
+      const Index* slot = slot_.data() + first;
+      for (Index e = 0; e < entries; ++e) values[slot[e]] += entry[e];
+    }
+  });
 }
 
 Vec sum_corners(const FacesRef& faces, Index n_vertices, const Rows& gradients) {

@@ -51,14 +51,14 @@ SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef
                                const PointsRef& image) {
   const Index m = static_cast<Index>(faces.rows());
   Vec dirichlet(m), areas(m);  // |t| (s1^2 + s2^2) and image areas
-  for (Index f = 0; f < m; ++f) {
+  for_rows(m, [&](Index f) {
     Eigen::Vector3d p[3];
     for (int k = 0; k < 3; ++k) p[k] = image.row(faces(f, k));
     areas(f) = 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
     dirichlet(f) = 0.0;
     for (int k = 0; k < 3; ++k)
       dirichlet(f) += 0.5 * reference.cotan(f, k) * (p[(k + 2) % 3] - p[(k + 1) % 3]).squaredNorm();
-  }
+  });
   const double total = areas.sum();
   const Eigen::ArrayXd ratio = areas.array() / (total * reference.areas.array());
   const Eigen::ArrayXd squares = dirichlet.array() / (total * reference.areas.array());

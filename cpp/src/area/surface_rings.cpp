@@ -5,6 +5,7 @@
 
 #include "area/face_jet.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 
 namespace stretchmap::area {
 
@@ -28,15 +29,19 @@ Rings measure(const GlideProblem& problem, const Points2Ref& angles) {
   const Index n = problem.chart.n_vertices;
   const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Rings rings{Vec::Zero(n), Vec::Zero(n), Rows(faces.rows(), 6), 0.0};
-  for (Index f = 0; f < faces.rows(); ++f) {
+  Vec areas(faces.rows());
+  for_rows(static_cast<Index>(faces.rows()), kElementChunk, [&](Index f) {
     TorusPoint p[3];
     for (int k = 0; k < 3; ++k) p[k] = points[faces(f, k)];
     const Jet area = area_jet(p, false);
     rings.gradients.row(f) = area.gradient;
-    rings.total += area.value;
+    areas(f) = area.value;
+  });
+  for (Index f = 0; f < faces.rows(); ++f) {
+    rings.total += areas(f);
     for (int k = 0; k < 3; ++k) {
       rings.source(faces(f, k)) += problem.reference.areas(f);
-      rings.image(faces(f, k)) += area.value;
+      rings.image(faces(f, k)) += areas(f);
     }
   }
   return rings;
@@ -46,7 +51,7 @@ Rings measure(const GlideProblem& problem, const Points2Ref& angles) {
 Rows elements(const GlideProblem& problem, const Rings& rings, const Rows& hessians) {
   using NineNine = Eigen::Matrix<double, 9, 9>;
   Rows blocks(hessians.rows(), 81);
-  for (Index f = 0; f < hessians.rows(); ++f) {
+  for_rows(static_cast<Index>(hessians.rows()), kElementChunk, [&](Index f) {
     const Eigen::Map<const Eigen::Matrix<double, 6, 6>> hessian(hessians.row(f).data());
     NineNine block = NineNine::Zero();
     for (int j = 0; j < 3; ++j) {
@@ -59,17 +64,31 @@ Rows elements(const GlideProblem& problem, const Rings& rings, const Rows& hessi
       }
     }
     Eigen::Map<NineNine>(blocks.row(f).data()) = block;
-  }
+  });
   return blocks;
+}
+
+Vec product(const SparseMatrix& matrix, const Vec& x) {
+  Vec result(matrix.rows());
+  for_rows(static_cast<Index>(matrix.rows()), kElementChunk, [&](Index i) {
+    double sum = 0.0;
+    for (SparseMatrix::InnerIterator it(matrix, i); it; ++it) sum += it.value() * x(it.col());
+    result(i) = sum;
+  });
+  return result;
 }
 
 SparseMatrix with_give(SparseMatrix matrix) {
   const Index n = static_cast<Index>(matrix.rows()) / 3;
   const double size = Vec(matrix.diagonal()).sum() / (2.0 * n);
+  Vec couplings(n);
+  for_rows(n, kElementChunk,
+           [&](Index i) { couplings(i) = matrix.row(3 * i + 2).squaredNorm() / n; });
   double coupling = 0.0;
-  for (Index i = 2; i < 3 * n; i += 3) coupling += matrix.row(i).squaredNorm() / n;
-  for (Index i = 0; i < 3 * n; ++i)
+  for (const double one : couplings) coupling += one;
+  for_rows(3 * n, [&](Index i) {
     matrix.coeffRef(i, i) += i % 3 == 2 ? -kGive * coupling / size : kRingRidge * size;
+  });
   return matrix;
 }
 
@@ -96,7 +115,7 @@ Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weig
   }
   Vec solution = factor_->solve(right);
   for (int i = 0; i < kRefinements; ++i) {
-    const Vec residual = right - exact_ * solution;
+    const Vec residual = right - product(exact_, solution);
     if (residual.norm() <= kAccuracy * right.norm()) break;
     solution += factor_->solve(residual);
   }

@@ -1,5 +1,7 @@
 #include "stretchmap/area/surface_stretch.hpp"
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::area {
 
 namespace {
@@ -30,8 +32,9 @@ Eigen::Matrix3d element(const Corners& p, double area) {
 template <class Of>
 SparseMatrix assemble(const SurfacePattern& pattern, const VecRef& areas, const Of& of) {
   Rows elements(areas.size(), 9);
-  for (Index f = 0; f < areas.size(); ++f)
+  for_rows(static_cast<Index>(areas.size()), kElementChunk, [&](Index f) {
     Eigen::Map<Eigen::Matrix3d>(elements.row(f).data()) = element(of(f), areas(f));
+  });
   SparseMatrix matrix = pattern.zeros();
   pattern.scatter(elements, matrix.valuePtr());
   return matrix;

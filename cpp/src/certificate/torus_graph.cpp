@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/torus.hpp"
 
 namespace stretchmap::certificate {
@@ -73,13 +74,16 @@ FaceOnTorus examine(const std::array<Vec3, 3>& x, double R) {
 }  // namespace
 
 TorusGraph torus_graph(const PointsRef& points, const FacesRef& faces, double R) {
+  std::vector<FaceOnTorus> examined(static_cast<std::size_t>(faces.rows()));
+  for_rows(static_cast<Index>(faces.rows()), kCostlyChunk, [&](Index f) {
+    examined[f] =
+        examine({points.row(faces(f, 0)), points.row(faces(f, 1)), points.row(faces(f, 2))}, R);
+  });
   std::vector<Index> bad;
   double area = 0.0;
-  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    const FaceOnTorus face =
-        examine({points.row(faces(f, 0)), points.row(faces(f, 1)), points.row(faces(f, 2))}, R);
-    area += face.chart_area;
-    if (!face.proven) bad.push_back(static_cast<Index>(f));
+  for (Index f = 0; f < static_cast<Index>(faces.rows()); ++f) {
+    area += examined[f].chart_area;
+    if (!examined[f].proven) bad.push_back(f);
   }
   TorusGraph out;
   out.winding = bad.empty() ? area / (4.0 * kPi * kPi) : std::numeric_limits<double>::quiet_NaN();

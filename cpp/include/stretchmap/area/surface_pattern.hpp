@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "stretchmap/base/incidence.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap::area {
@@ -22,7 +23,9 @@ class SurfacePattern {
   void scatter(const RowsRef& elements, double* values) const;
 
  private:
+  Index block_;
   SparseMatrix zeros_;
+  Incidence<> corners_;      // of faces at each vertex
   std::vector<Index> slot_;  // m (3 block)^2 positions in the value array
 };
 

@@ -100,4 +100,16 @@ std::array<double, K> sum_chunks(Index n, const Body& body) {
   return total;
 }
 
+// The least of `most` and of all value(i) that compare with it, i of [0, n).
+template <class Value>
+double least_of(Index n, double most, const Value& value) {
+  std::vector<double> least(static_cast<std::size_t>(chunk_count(n, kElementChunk)), most);
+  for_chunks(n, kElementChunk, [&](Index begin, Index end) {
+    double& mine = least[static_cast<std::size_t>(begin / kElementChunk)];
+    for (Index i = begin; i < end; ++i) mine = std::min(mine, value(i));
+  });
+  for (const double other : least) most = std::min(most, other);
+  return most;
+}
+
 }  // namespace stretchmap

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -32,16 +33,20 @@ class BlockLdlt {
     Index first = 0, last = 0;    // its block rows, by their places in the elimination order
     std::vector<Index> children;  // fronts eliminated before
     std::vector<Index> border;    // later places its elimination fills, ascending
+    Index inside = 0;             // so many of them are of the same subtree
     std::size_t start = 0;        // of its panel in values_: L below the diagonal and D on it
 
     Index own() const { return last - first; }
     Index size() const { return own() + static_cast<Index>(border.size()); }
   };
-  using Leftover = std::vector<double>;  // what an eliminated front subtracts from later ones
+  using Leftover = std::unique_ptr<double[]>;  // what an eliminated front adds to later ones
+  using Panel = Eigen::Map<const Eigen::MatrixXd>;
 
   void find_borders(const SparseMatrix& A);
   void group_fronts();
   void eliminate(const SparseMatrix& A, Index front, std::vector<Leftover>& leftovers);
+  Vec forward(const Front& front, Vec& x) const;
+  void backward(const Front& front, Vec& x) const;
 
   Index n_ = 0;                                 // block rows
   std::vector<Index> place_;                    // block row -> its place in the elimination order
@@ -49,7 +54,7 @@ class BlockLdlt {
   std::vector<Front> fronts_;                   // children before their parents
   std::vector<std::pair<Index, Index>> trees_;  // ranges of fronts that are subtrees of their own
   std::vector<Index> top_;                      // fronts in none of them, ascending
-  std::vector<double> values_;
+  std::unique_ptr<double[]> values_;
 };
 
 }  // namespace stretchmap::linalg

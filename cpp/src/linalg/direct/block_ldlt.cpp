@@ -12,7 +12,9 @@ namespace stretchmap::linalg {
 
 namespace {
 
-constexpr Index kTrees = 32;  // subtrees at least that threads work on, if there are so many
+constexpr Index kTrees = 32;    // subtrees at least that threads work on, if there are so many
+constexpr Index kColumns = 16;  // block columns of a front that one thread fills
+constexpr Index kRows = 128;    // rows of a front that one thread multiplies
 
 // Block columns of block row i, in the matrix's own numbering.
 template <int K>
@@ -75,7 +77,8 @@ void BlockLdlt<K>::find_borders(const SparseMatrix& A) {
     front.start = total;
     total += static_cast<std::size_t>(K * K) * front.size() * front.own();
   }
-  values_.resize(total);
+  // Set when factorized, by the threads that work there; all this memory at once takes longer.
+  values_.reset(new double[total]);
 }
 
 // Subtrees of moderate size, each for one thread; the few large fronts above them are for all.
@@ -91,6 +94,11 @@ void BlockLdlt<K>::group_fronts() {
     const Index f = open[i];
     if ((f - least[f] + 1) * kTrees <= static_cast<Index>(fronts_.size())) {
       trees_.emplace_back(least[f], f + 1);
+      for (Index g = least[f]; g <= f; ++g) {
+        const std::vector<Index>& border = fronts_[g].border;
+        const auto behind = std::lower_bound(border.begin(), border.end(), fronts_[f].last);
+        fronts_[g].inside = static_cast<Index>(behind - border.begin());
+      }
     } else {
       top_.push_back(f);
       open.insert(open.end(), fronts_[f].children.begin(), fronts_[f].children.end());
@@ -104,10 +112,15 @@ void BlockLdlt<K>::eliminate(const SparseMatrix& A, Index f, std::vector<Leftove
   const Front& front = fronts_[f];
   const Index own = front.own(), size = front.size(), rest = size - own;
   const std::ptrdiff_t rows = K * size, lower = K * rest;
-  double* panel = values_.data() + front.start;
-  std::fill_n(panel, rows * K * own, 0.0);
+  double* panel = values_.get() + front.start;
   Leftover& leftover = leftovers[f];
-  leftover.assign(static_cast<std::size_t>(lower) * lower, 0.0);
+  leftover.reset(new double[static_cast<std::size_t>(lower) * lower]);
+  for_rows(size, kColumns, [&](Index j) {
+    if (j < own)
+      std::fill_n(panel + K * j * rows, K * rows, 0.0);
+    else
+      std::fill_n(leftover.get() + K * (j - own) * lower, K * lower, 0.0);
+  });
   const auto row_of = [&](Index place) {
     return place < front.last
                ? place - front.first
@@ -118,36 +131,38 @@ void BlockLdlt<K>::eliminate(const SparseMatrix& A, Index f, std::vector<Leftove
   // Where block (i, j) of the front is, j <= i, and the distance of its columns.
   const auto at = [&](Index i, Index j) {
     return j < own ? std::pair(panel + K * j * rows + K * i, rows)
-                   : std::pair(leftover.data() + K * (j - own) * lower + K * (i - own), lower);
+                   : std::pair(leftover.get() + K * (j - own) * lower + K * (i - own), lower);
   };
-  for (Index k = front.first; k < front.last; ++k) {
+  for_rows(own, kColumns, [&](Index j) {
+    const Index k = front.first + j;
     const BlockRow<K> row(A, order_[k]);
     for (Index e = 0; e < row.size; ++e) {
       const Index place = place_[row.column(e)];
       if (place < k) continue;
-      const auto [to, stride] = at(row_of(place), k - front.first);
+      const auto [to, stride] = at(row_of(place), j);
       for (int c = 0; c < K; ++c)
         for (int d = 0; d < K; ++d)
           to[c * stride + d] = A.valuePtr()[row.first + (c * row.size + e) * K + d];
     }
-  }
+  });
   for (const Index child : front.children) {
     const std::vector<Index>& border = fronts_[child].border;
     const Index count = static_cast<Index>(border.size());
     std::vector<Index> to(border.size());
     std::transform(border.begin(), border.end(), to.begin(), row_of);
     const std::ptrdiff_t height = K * count;
-    for (Index j = 0; j < count; ++j)
+    for_rows(count, kColumns, [&](Index j) {
       for (int c = 0; c < K; ++c) {
-        const double* from = leftovers[child].data() + (K * j + c) * height;
+        const double* from = leftovers[child].get() + (K * j + c) * height;
         const auto [column, stride] = at(to[j], to[j]);
         for (Index i = j; i < count; ++i)
           for (int d = 0; d < K; ++d)
             column[c * stride + K * (to[i] - to[j]) + d] += from[K * i + d];
       }
-    Leftover().swap(leftovers[child]);
+    });
+    leftovers[child].reset();
   }
-  const Index bad = eliminate_front(panel, leftover.data(), K * size, K * own);
+  const Index bad = eliminate_front(panel, leftover.get(), K * size, K * own);
   if (bad >= 0)
     throw Error("SolverError", "a pivot is zero or not finite", {order_[front.first + bad / K]});
 }
@@ -172,39 +187,71 @@ void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
   }
 }
 
+// What a front takes from the unknowns behind it: rows of far, shared among threads.
+template <int K>
+Vec BlockLdlt<K>::forward(const Front& front, Vec& x) const {
+  const Panel panel(values_.get() + front.start, K * front.size(), K * front.own());
+  auto near = x.segment(K * front.first, K * front.own());
+  panel.topRows(near.size()).template triangularView<Eigen::UnitLower>().solveInPlace(near);
+  Vec far(panel.rows() - near.size());
+  for_chunks(static_cast<Index>(far.size()), kRows, [&](Index begin, Index end) {
+    far.segment(begin, end - begin).noalias() =
+        panel.middleRows(near.size() + begin, end - begin) * near;
+  });
+  near.array() /= panel.diagonal().array();
+  return far;
+}
+
+template <int K>
+void BlockLdlt<K>::backward(const Front& front, Vec& x) const {
+  const Panel panel(values_.get() + front.start, K * front.size(), K * front.own());
+  auto near = x.segment(K * front.first, K * front.own());
+  Vec far(panel.rows() - near.size());
+  for (Index i = 0; i < static_cast<Index>(front.border.size()); ++i)
+    far.template segment<K>(K * i) = x.template segment<K>(K * front.border[i]);
+  for_chunks(static_cast<Index>(near.size()), kRows, [&](Index begin, Index end) {
+    near.segment(begin, end - begin).noalias() -=
+        panel.block(near.size(), begin, far.size(), end - begin).transpose() * far;
+  });
+  panel.topRows(near.size())
+      .transpose()
+      .template triangularView<Eigen::UnitUpper>()
+      .solveInPlace(near);
+}
+
 template <int K>
 Vec BlockLdlt<K>::solve(const VecRef& right) const {
   Vec x(right.size());
-  for (Index k = 0; k < n_; ++k)
+  for_rows(n_, [&](Index k) {
     x.template segment<K>(K * k) = right.template segment<K>(K * order_[k]);
-  using Panel = Eigen::Map<const Eigen::MatrixXd>;
-  Vec far;
-  const auto gather = [&](const Front& front) {
-    for (Index i = 0; i < static_cast<Index>(front.border.size()); ++i)
-      far.template segment<K>(K * i) = x.template segment<K>(K * front.border[i]);
-  };
-  for (const Front& front : fronts_) {
-    const Panel panel(values_.data() + front.start, K * front.size(), K * front.own());
-    auto near = x.segment(K * front.first, K * front.own());
-    panel.topRows(near.size()).template triangularView<Eigen::UnitLower>().solveInPlace(near);
-    far.noalias() = panel.bottomRows(panel.rows() - near.size()) * near;
-    for (Index i = 0; i < static_cast<Index>(front.border.size()); ++i)
+  });
+  const auto subtract = [&](const Front& front, const Vec& far, Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
       x.template segment<K>(K * front.border[i]) -= far.template segment<K>(K * i);
-    near.array() /= panel.diagonal().array();
+  };
+  // What a subtree's fronts take from unknowns behind it waits until it is their turn.
+  std::vector<Vec> far(fronts_.size());
+  for_tasks(static_cast<Index>(trees_.size()), [&](Index t) {
+    for (Index f = trees_[t].first; f < trees_[t].second; ++f) {
+      far[f] = forward(fronts_[f], x);
+      subtract(fronts_[f], far[f], 0, fronts_[f].inside);
+    }
+  });
+  auto top = top_.begin();
+  for (Index f = 0; f < static_cast<Index>(fronts_.size()); ++f) {
+    const Front& front = fronts_[f];
+    if (top != top_.end() && *top == f) {
+      far[f] = forward(front, x);
+      ++top;
+    }
+    subtract(front, far[f], front.inside, static_cast<Index>(front.border.size()));
   }
-  for (auto front = fronts_.rbegin(); front != fronts_.rend(); ++front) {
-    const Panel panel(values_.data() + front->start, K * front->size(), K * front->own());
-    auto near = x.segment(K * front->first, K * front->own());
-    far.resize(panel.rows() - near.size());
-    gather(*front);
-    near.noalias() -= panel.bottomRows(far.size()).transpose() * far;
-    panel.topRows(near.size())
-        .transpose()
-        .template triangularView<Eigen::UnitUpper>()
-        .solveInPlace(near);
-  }
+  for (auto f = top_.rbegin(); f != top_.rend(); ++f) backward(fronts_[*f], x);
+  for_tasks(static_cast<Index>(trees_.size()), [&](Index t) {
+    for (Index f = trees_[t].second; f-- > trees_[t].first;) backward(fronts_[f], x);
+  });
   Vec solution(right.size());
-  for (Index k = 0; k < n_; ++k) solution.segment<K>(K * order_[k]) = x.template segment<K>(K * k);
+  for_rows(n_, [&](Index k) { solution.segment<K>(K * order_[k]) = x.template segment<K>(K * k); });
   return solution;
 }
 

@@ -30,16 +30,32 @@ STRETCHMAP_CLONES void multiply_tile(const double* a, const double* b, Index dep
     for (Index i = 0; i < kTall; ++i) tile[kTall * j + i] = sum[j][i];
 }
 
-// The columns right of `c` up to `end`, and all rows from there on, less the outer product.
+// The columns right of `c` up to `end`, and the rows from there on up to `end`, less the outer
+// product.
 STRETCHMAP_CLONES void eliminate_column(double* panel, std::ptrdiff_t rows, Index c, Index end) {
   double* column = panel + c * rows;
   const double pivot = column[c];
   for (Index to = c + 1; to < end; ++to) {
     const double factor = column[to] / pivot;
     double* target = panel + to * rows;
-    for (std::ptrdiff_t r = to; r < rows; ++r) target[r] -= factor * column[r];
+    for (Index r = to; r < end; ++r) target[r] -= factor * column[r];
   }
-  for (std::ptrdiff_t r = c + 1; r < rows; ++r) column[r] /= pivot;
+  for (Index r = c + 1; r < end; ++r) column[r] /= pivot;
+}
+
+// The same of rows [top, bottom) below them, for all columns [begin, end) one after the other.
+STRETCHMAP_CLONES void eliminate_rows(double* panel, std::ptrdiff_t rows, Index begin, Index end,
+                                      std::ptrdiff_t top, std::ptrdiff_t bottom) {
+  for (Index c = begin; c < end; ++c) {
+    double* column = panel + c * rows;
+    const double pivot = column[c];
+    for (Index to = c + 1; to < end; ++to) {
+      const double factor = column[to];
+      double* target = panel + to * rows;
+      for (std::ptrdiff_t r = top; r < bottom; ++r) target[r] -= factor * column[r];
+    }
+    for (std::ptrdiff_t r = top; r < bottom; ++r) column[r] /= pivot;
+  }
 }
 
 // Rows [first, first + n) and columns [begin, end) of L, in strips of `size` rows, padded with
@@ -111,6 +127,9 @@ Index eliminate_front(double* panel, double* schur, Index rows, Index own) {
       if (!std::isfinite(1.0 / diagonal[c])) return c;
       eliminate_column(panel, stride, c, end);
     }
+    for_chunks(rows - end, kRows, [&](Index top, Index bottom) {
+      eliminate_rows(panel, stride, begin, end, end + top, end + bottom);
+    });
   }
   update({schur, stride - own, rows - own, rows - own}, panel, stride, own, own, own,
          diagonal.data());
