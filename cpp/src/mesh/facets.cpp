@@ -9,10 +9,10 @@
 namespace stretchmap::mesh {
 namespace {
 
-constexpr Index kBetweenPolls = 65536;  // vertices
+constexpr Index kBetweenPolls = 128 * kElementChunk;  // vertices
 
 // All but the lowest vertex of a facet in ascending order, packed, and the facet.
-template <std::size_t N>
+template <int N>
 struct Key {
   std::uint64_t high;  // second and third lowest vertex
   std::uint32_t low;   // fourth, for whole tets
@@ -43,105 +43,102 @@ struct Key<2> {
   }
 };
 
-// corners(facet) returns the ids of a facet in any order; `used(facet)` says whether it counts.
-// Counting sort by the lowest id, then a short sort inside each bucket.
-template <std::size_t N, class Corners, class Used>
-FacetGroups group(Index n_facets, Index n_vertices, Corners corners, Used used, const Poll& poll) {
-  const auto now_and_then = [&](Index i, Index period) {
-    if (poll && i % period == 0) poll();
-  };
-  std::vector<Index> bucket(static_cast<std::size_t>(n_vertices) + 1, 0);
-  for (Index h = 0; h < n_facets; ++h) {
-    now_and_then(h, 262144);
-    if (!used(h)) continue;
-    const std::array<Index, N> c = corners(h);
-    ++bucket[*std::min_element(c.begin(), c.end()) + 1];
-  }
-  for (Index i = 0; i < n_vertices; ++i) bucket[i + 1] += bucket[i];
-  std::vector<Key<N>> keys(bucket[n_vertices]);
-  std::vector<Index> cursor(bucket.begin(), bucket.end() - 1);
-  for (Index h = 0; h < n_facets; ++h) {
-    now_and_then(h, 262144);
-    if (!used(h)) continue;
-    std::array<Index, N> c = corners(h);
-    std::sort(c.begin(), c.end());
-    keys[cursor[c[0]]++] = Key<N>(c, h);
-  }
+constexpr int kHalfEdge[3][2] = {{0, 1}, {1, 2}, {2, 0}};
+constexpr int kFace[1][3] = {{0, 1, 2}};
+constexpr int kTet[1][4] = {{0, 1, 2, 3}};
+
+// Groups found from one chunk of vertices: those of which they are the lowest.
+struct Part {
+  std::vector<Index> order, start;
+};
+
+FacetGroups joined(std::vector<Part>& parts) {
+  std::vector<std::array<std::size_t, 2>> place{{0, 0}};
+  for (const Part& part : parts)
+    place.push_back({place.back()[0] + part.order.size(), place.back()[1] + part.start.size()});
   FacetGroups groups;
-  groups.order.resize(keys.size());
-  groups.start.reserve(keys.size() / 2 + 1);
-  std::vector<std::vector<Index>> starts(chunk_count(kBetweenPolls, kElementChunk));
-  for (Index first = 0; first < n_vertices; first += kBetweenPolls) {
-    if (poll) poll();
-    const Index count = std::min(kBetweenPolls, n_vertices - first);
-    for_chunks(count, kElementChunk, [&](Index begin, Index end) {
-      std::vector<Index>& start = starts[begin / kElementChunk];
-      start.clear();
-      for (Index i = first + begin; i < first + end; ++i) {
-        std::sort(keys.begin() + bucket[i], keys.begin() + bucket[i + 1]);
-        for (Index p = bucket[i]; p < bucket[i + 1]; ++p) {
-          if (p == bucket[i] || !keys[p].same(keys[p - 1])) start.push_back(p);
-          groups.order[p] = keys[p].facet;
-        }
-      }
-    });
-    for (Index c = 0; c < chunk_count(count, kElementChunk); ++c)
-      groups.start.insert(groups.start.end(), starts[c].begin(), starts[c].end());
-  }
-  groups.start.push_back(static_cast<Index>(keys.size()));
+  groups.order.resize(place.back()[0]);
+  groups.start.resize(place.back()[1] + 1);
+  for_tasks(static_cast<Index>(parts.size()), [&](Index p) {
+    const auto [order, start] = place[p];
+    std::copy(parts[p].order.begin(), parts[p].order.end(), groups.order.begin() + order);
+    std::transform(parts[p].start.begin(), parts[p].start.end(), groups.start.begin() + start,
+                   [first = order](Index at) { return at + static_cast<Index>(first); });
+    parts[p] = Part();
+  });
+  groups.start.back() = static_cast<Index>(groups.order.size());
   return groups;
+}
+
+// Facet F e + j of element e has the element's corners facet[j]. A facet is found from its lowest
+// vertex; a short sort there brings equal ones together.
+template <class Elements, int F, int N>
+FacetGroups group(const Elements& elements, const int (&facet)[F][N], const Incidence<>& corners,
+                  const Mask& skip, const Poll& poll) {
+  const Index width = static_cast<Index>(elements.cols());
+  const auto gather = [&](Index vertex, std::vector<Key<N>>& keys) {
+    keys.clear();
+    for (const Index corner : corners[vertex]) {
+      const Index e = corner / width, k = corner % width;
+      if (!skip.empty() && skip[e]) continue;
+      for (int j = 0; j < F; ++j) {
+        std::array<Index, N> ids;
+        int least = 0;
+        for (int i = 0; i < N; ++i) {
+          ids[i] = elements(e, facet[j][i]);
+          if (ids[i] < ids[least]) least = i;
+        }
+        if (facet[j][least] != k) continue;
+        std::sort(ids.begin(), ids.end());
+        keys.emplace_back(ids, F * e + j);
+      }
+    }
+    std::sort(keys.begin(), keys.end());
+  };
+  const Index n = corners.size();
+  std::vector<Part> parts(static_cast<std::size_t>(chunk_count(n, kElementChunk)));
+  for (Index first = 0; first < n; first += kBetweenPolls) {
+    if (poll) poll();
+    for_chunks_with(
+        std::min(kBetweenPolls, n - first), kElementChunk, [] { return std::vector<Key<N>>(); },
+        [&](Index begin, Index end, std::vector<Key<N>>& keys) {
+          Part& part = parts[(first + begin) / kElementChunk];
+          for (Index i = first + begin; i < first + end; ++i) {
+            gather(i, keys);
+            for (std::size_t p = 0; p < keys.size(); ++p) {
+              if (p == 0 || !keys[p].same(keys[p - 1]))
+                part.start.push_back(static_cast<Index>(part.order.size()));
+              part.order.push_back(keys[p].facet);
+            }
+          }
+        });
+  }
+  return joined(parts);
 }
 
 }  // namespace
 
-FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip,
+FacetGroups group_half_edges(const FacesRef& faces, const Incidence<>& corners, const Mask& skip,
                              const Poll& poll) {
-  return group<2>(
-      static_cast<Index>(3 * faces.rows()), n_vertices,
-      [&](Index h) {
-        return std::array<Index, 2>{faces(h / 3, h % 3), faces(h / 3, (h + 1) % 3)};
-      },
-      [&](Index h) { return skip.empty() || !skip[h / 3]; }, poll);
+  return group(faces, kHalfEdge, corners, skip, poll);
 }
 
-FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip,
+FacetGroups group_half_faces(const TetsRef& tets, const Incidence<>& corners, const Mask& skip,
                              const Poll& poll) {
-  return group<3>(
-      static_cast<Index>(4 * tets.rows()), n_vertices,
-      [&](Index h) {
-        const auto f = half_face(tets, h);
-        return std::array<Index, 3>{f[0], f[1], f[2]};
-      },
-      [&](Index h) { return skip.empty() || !skip[h / 4]; }, poll);
+  return group(tets, kTetFace, corners, skip, poll);
 }
 
-FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip,
+FacetGroups group_tet_edges(const TetsRef& tets, const Incidence<>& corners, const Mask& skip,
                             const Poll& poll) {
-  return group<2>(
-      static_cast<Index>(6 * tets.rows()), n_vertices,
-      [&](Index h) {
-        const int* corner = kTetEdge[h % 6];
-        return std::array<Index, 2>{tets(h / 6, corner[0]), tets(h / 6, corner[1])};
-      },
-      [&](Index h) { return skip.empty() || !skip[h / 6]; }, poll);
+  return group(tets, kTetEdge, corners, skip, poll);
 }
 
-FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices) {
-  return group<3>(
-      static_cast<Index>(faces.rows()), n_vertices,
-      [&](Index f) {
-        return std::array<Index, 3>{faces(f, 0), faces(f, 1), faces(f, 2)};
-      },
-      [](Index) { return true; }, {});
+FacetGroups group_equal_faces(const FacesRef& faces, const Incidence<>& corners) {
+  return group(faces, kFace, corners, {}, {});
 }
 
-FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  return group<4>(
-      static_cast<Index>(tets.rows()), n_vertices,
-      [&](Index t) {
-        return std::array<Index, 4>{tets(t, 0), tets(t, 1), tets(t, 2), tets(t, 3)};
-      },
-      [](Index) { return true; }, poll);
+FacetGroups group_equal_tets(const TetsRef& tets, const Incidence<>& corners, const Poll& poll) {
+  return group(tets, kTet, corners, {}, poll);
 }
 
 int same_turn(const Eigen::Matrix<Index, 1, 3>& a, const Eigen::Matrix<Index, 1, 3>& b) {

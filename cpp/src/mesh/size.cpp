@@ -92,10 +92,10 @@ Eigen::Array<bool, Eigen::Dynamic, 1> degenerate_tets(const PointsRef& points,
   const double rounding = kRounding * points.cwiseAbs().maxCoeff();
   const Vec volumes = tet_volumes(points, tets);
   Eigen::Array<bool, Eigen::Dynamic, 1> flat(tets.rows());
-  for (Index t = 0; t < tets.rows(); ++t) {
+  for_rows(static_cast<Index>(tets.rows()), [&](Index t) {
     const double edge = longest_edge(points, tets, t);
     flat[t] = !(6 * std::abs(volumes[t]) > std::max(kFlat * edge, rounding) * edge * edge);
-  }
+  });
   return flat;
 }
 

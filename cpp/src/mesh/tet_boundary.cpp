@@ -5,13 +5,20 @@
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/mesh/facets.hpp"
 
 namespace stretchmap::mesh {
 
 IndexVec tet_neighbors(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  const FacetGroups groups = group_half_faces(tets, n_vertices, {}, poll);
-  IndexVec twin = IndexVec::Constant(4 * tets.rows(), -1);
+  const FacetGroups groups = group_half_faces(tets, corners_at(tets, n_vertices), {}, poll);
+  IndexVec twin(4 * tets.rows());
+  for_rows(groups.size(), [&](Index g) {
+    const Index* h = groups.order.data() + groups.start[g];
+    const bool two = groups.start[g + 1] - groups.start[g] == 2;
+    twin[h[0]] = two ? h[1] : -1;
+    if (two) twin[h[1]] = h[0];
+  });
   for (Index g = 0; g < groups.size(); ++g) {
     const Index first = groups.start[g], last = groups.start[g + 1];
     if (last - first > 2) {
@@ -23,10 +30,6 @@ IndexVec tet_neighbors(const TetsRef& tets, Index n_vertices, const Poll& poll) 
                       std::to_string(f[2]) + ") belongs to " + std::to_string(last - first) +
                       " tets; at most two may meet at a face",
                   at_fault);
-    }
-    if (last - first == 2) {
-      twin[groups.order[first]] = groups.order[first + 1];
-      twin[groups.order[first + 1]] = groups.order[first];
     }
   }
   return twin;
@@ -59,7 +62,7 @@ TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices, const Poll& poll
 }
 
 Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  const FacetGroups groups = group_tet_edges(tets, n_vertices, {}, poll);
+  const FacetGroups groups = group_tet_edges(tets, corners_at(tets, n_vertices), {}, poll);
   Edges edges(groups.size(), 2);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index h = groups.order[groups.start[g]];

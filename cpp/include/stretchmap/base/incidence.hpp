@@ -1,9 +1,11 @@
 // What meets each of n things: the tets round a vertex, the edges round it, the boxes in a cell.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap {
@@ -25,11 +27,40 @@ class Incidence {
     enumerate([&](Index thing, const Item& item) { items_[next[thing]++] = item; });
   }
 
+  // The same in parts, which threads share: enumerate(part, visit) visits the pairs of part 0, 1,
+  // ...
+  template <class Enumerate>
+  Incidence(Index n, Index parts, const Enumerate& enumerate)
+      : start_(static_cast<std::size_t>(n) + 1, 0) {
+    const auto things = static_cast<std::size_t>(n);
+    std::vector<Offset> next(things * static_cast<std::size_t>(parts), 0);
+    for_tasks(parts, [&](Index part) {
+      Offset* count = next.data() + things * static_cast<std::size_t>(part);
+      enumerate(part, [&](Index thing, const Item&) { ++count[thing]; });
+    });
+    Offset total = 0;
+    for (std::size_t i = 0; i < things; ++i) {
+      start_[i] = total;
+      for (std::size_t at = i; at < next.size(); at += things) {
+        const Offset count = next[at];
+        next[at] = total;
+        total += count;
+      }
+    }
+    start_[things] = total;
+    items_.resize(static_cast<std::size_t>(total));
+    for_tasks(parts, [&](Index part) {
+      Offset* to = next.data() + things * static_cast<std::size_t>(part);
+      enumerate(part, [&](Index thing, const Item& item) { items_[to[thing]++] = item; });
+    });
+  }
+
   struct Range {
     const Item *first, *last;
     const Item* begin() const { return first; }
     const Item* end() const { return last; }
   };
+  Index size() const { return static_cast<Index>(start_.size()) - 1; }
   Range operator[](Index thing) const { return of(thing, thing + 1); }
   // Of all things in [first, last).
   Range of(Index first, Index last) const {
@@ -45,9 +76,12 @@ class Incidence {
 // ascending; entries for which row_of(vertex) is negative are in none.
 template <class Elements, class RowOf>
 Incidence<> corners_at(const Elements& elements, Index n, const RowOf& row_of) {
+  constexpr Index kLeast = 16384, kMost = 8;  // elements of a part, parts
   const Index m = static_cast<Index>(elements.rows()), width = static_cast<Index>(elements.cols());
-  return Incidence<>(n, [&](const auto& visit) {
-    for (Index e = 0; e < m; ++e)
+  const Index parts = std::clamp(chunk_count(m, kLeast), Index{1}, kMost);
+  const Index size = chunk_count(m, parts);
+  return Incidence<>(n, parts, [&](Index part, const auto& visit) {
+    for (Index e = part * size; e < std::min(m, (part + 1) * size); ++e)
       for (Index k = 0; k < width; ++k)
         if (const Index row = row_of(elements(e, k)); row >= 0) visit(row, width * e + k);
   });
