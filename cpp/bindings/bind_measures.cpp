@@ -15,6 +15,14 @@ void bind(py::module_& m) {
         py::arg("image").noconvert(), release_gil());
   m.def("ring_sums", &ring_sums, py::arg("elements").noconvert(), py::arg("values").noconvert(),
         py::arg("n_vertices"), release_gil());
+  py::class_<ShareDeviations>(m, "ShareDeviations")
+      .def_readonly("rings", &ShareDeviations::rings)
+      .def_readonly("elements", &ShareDeviations::elements);
+  m.def("share_deviations", &share_deviations, py::arg("elements").noconvert(),
+        py::arg("shares").noconvert(), py::arg("rings").noconvert(), py::arg("sizes").noconvert(),
+        release_gil());
+  m.def("direction_scatter", &direction_scatter, py::arg("directions").noconvert(),
+        py::arg("metric"), release_gil());
 }
 
 }  // namespace stretchmap::measures

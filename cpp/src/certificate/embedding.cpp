@@ -14,6 +14,8 @@ namespace {
 using Triple = Eigen::Matrix<Index, 1, 3>;
 using Triangle = std::array<Point, 3>;
 
+constexpr Index kAtOnce = 4096;  // faces between two looks at whether to go on
+
 bool point_in_triangle(const Point& p, const Triangle& t, int axis, int turn) {
   for (int k = 0; k < 3; ++k) {
     if (orient2d(t[k], t[(k + 1) % 3], p, axis) * turn < 0) return false;
@@ -179,15 +181,22 @@ Edges crossing_faces(const PointsRef& points, const FacesRef& faces, Index limit
   }
   const BoxTree tree(std::move(boxes));
   std::vector<std::array<Index, 2>> pairs;
-  std::vector<Index> near;
-  for (Index f = 0; f < m && static_cast<Index>(pairs.size()) < limit; ++f) {
-    if (poll && f % 4096 == 0) poll();
-    near.clear();
-    tree.overlaps(f, near);
-    std::sort(near.begin(), near.end());
-    for (const Index g : near) {
-      if (triangles_meet(points, faces.row(f), faces.row(g))) pairs.push_back({f, g});
-    }
+  for (Index first = 0; first < m && static_cast<Index>(pairs.size()) < limit; first += kAtOnce) {
+    if (poll) poll();
+    const Index count = std::min(kAtOnce, m - first);
+    std::vector<std::vector<std::array<Index, 2>>> found(chunk_count(count, kCostlyChunk));
+    for_chunks(count, kCostlyChunk, [&](Index begin, Index end) {
+      std::vector<Index> near;
+      for (Index f = first + begin; f < first + end; ++f) {
+        near.clear();
+        tree.overlaps(f, near);
+        std::sort(near.begin(), near.end());
+        for (const Index g : near)
+          if (triangles_meet(points, faces.row(f), faces.row(g)))
+            found[begin / kCostlyChunk].push_back({f, g});
+      }
+    });
+    for (const auto& part : found) pairs.insert(pairs.end(), part.begin(), part.end());
   }
   const Index count = std::min(limit, static_cast<Index>(pairs.size()));
   Edges out(count, 2);

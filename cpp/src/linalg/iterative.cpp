@@ -83,8 +83,8 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
       largest = std::max(largest, std::abs(b[static_cast<size_t>(stride) * row + k]));
     if (largest > 0.0 && std::isfinite(largest)) factor[k] = std::ldexp(1.0, -std::ilogb(largest));
   }
-  inner_b_.assign(n * B * K, 0.0);
-  inner_x_.assign(n * B * K, 0.0);
+  inner_b_.resize(n * B * K);
+  inner_x_.resize(n * B * K);
   // visit(entry of the inner vectors, of the caller's, factor) for all that are used.
   const auto each = [&](const auto& visit) {
     for_chunks(matrix_.n, [&](Index begin, Index end) {
@@ -92,6 +92,11 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
         for (int k = 0; k < used; ++k) visit(K * row + k, stride * row + k, factor[k]);
     });
   };
+  for_chunks(used < K ? matrix_.n : 0, [&](Index begin, Index end) {
+    constexpr size_t kRow = static_cast<size_t>(B) * K;
+    std::fill(inner_b_.data() + kRow * begin, inner_b_.data() + kRow * end, 0.0);
+    std::fill(inner_x_.data() + kRow * begin, inner_x_.data() + kRow * end, 0.0);
+  });
   each([&](size_t in, size_t out, double f) {
     inner_b_[in] = f * b[out];
     inner_x_[in] = f / matrix_.scale * x[out];

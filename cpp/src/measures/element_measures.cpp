@@ -1,5 +1,7 @@
 #include "stretchmap/measures/element_measures.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -80,6 +82,57 @@ Vec ring_sums(const Eigen::Ref<const IndexRows>& elements, const VecRef& values,
     for (Eigen::Index k = 0; k < elements.cols(); ++k) sums[elements(e, k)] += values[e];
   }
   return sums;
+}
+
+namespace {
+
+// Standard deviation of value(i), i of [0, n).
+template <class Value>
+double deviation(Index n, const Value& value) {
+  const double mean = sum_chunks<1>(n,
+                                    [&](Index begin, Index end, std::array<double, 1>& sum) {
+                                      for (Index i = begin; i < end; ++i) sum[0] += value(i);
+                                    })[0] /
+                      n;
+  const double square = sum_chunks<1>(n, [&](Index begin, Index end, std::array<double, 1>& sum) {
+    for (Index i = begin; i < end; ++i) sum[0] += (value(i) - mean) * (value(i) - mean);
+  })[0];
+  return std::sqrt(square / n);
+}
+
+}  // namespace
+
+ShareDeviations share_deviations(const Eigen::Ref<const IndexRows>& elements, const VecRef& shares,
+                                 const VecRef& rings, const VecRef& sizes) {
+  constexpr Index kLeast = 16384, kMost = 8;  // elements of a part, parts
+  const Index m = static_cast<Index>(elements.rows()), n = static_cast<Index>(rings.size());
+  const Index parts = std::clamp(chunk_count(m, kLeast), Index{1}, kMost);
+  const Index size = chunk_count(m, parts);
+  const double total = sum_chunks<1>(m, [&](Index begin, Index end, std::array<double, 1>& sum) {
+    for (Index e = begin; e < end; ++e) sum[0] += sizes[e];
+  })[0];
+  Eigen::MatrixXd sums(n, parts);  // of the sizes round each vertex
+  for_tasks(parts, [&](Index part) {
+    auto sum = sums.col(part);
+    sum.setZero();
+    for (Index e = part * size; e < std::min(m, (part + 1) * size); ++e)
+      for (Index k = 0; k < elements.cols(); ++k) sum[elements(e, k)] += sizes[e];
+  });
+  for_rows(n, [&](Index i) { sums(i, 0) = sums.row(i).sum(); });
+  return {deviation(n, [&](Index i) { return sums(i, 0) / (total * rings[i]); }),
+          deviation(m, [&](Index e) { return sizes[e] / (total * shares[e]); })};
+}
+
+Eigen::Matrix3d direction_scatter(const PointsRef& directions, const Eigen::Matrix3d& metric) {
+  const Index n = static_cast<Index>(directions.rows());
+  const auto sum = sum_chunks<9>(n, [&](Index begin, Index end, std::array<double, 9>& sums) {
+    Eigen::Map<Eigen::Matrix3d> scatter(sums.data());
+    for (Index i = begin; i < end; ++i) {
+      const Vec3 d = directions.row(i);
+      scatter += d * d.transpose() / d.dot(metric * d);
+    }
+  });
+  return Eigen::Map<const Eigen::Matrix3d>(sum.data());
 }
 
 }  // namespace stretchmap::measures

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::volume {
 namespace {
 
@@ -49,7 +51,8 @@ linalg::SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c
   }
   const IndexVec& interior = laplacian_.interior();
   unknowns_.resize(interior.size(), 3);
-  for (Index i = 0; i < interior.size(); ++i) unknowns_.row(i) = x.row(interior[i]);
+  const Index n = static_cast<Index>(interior.size());
+  for_rows(n, [&](Index i) { unknowns_.row(i) = x.row(interior[i]); });
   linalg::SolveReport report;
   if (solves_++ < kSettling || worn_ || backend() == "direct") {
     if (!first) solver_->refactor();
@@ -59,7 +62,7 @@ linalg::SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c
   } else {
     report = solve_kept(options, poll);
   }
-  for (Index i = 0; i < interior.size(); ++i) x.row(interior[i]) = unknowns_.row(i);
+  for_rows(n, [&](Index i) { x.row(interior[i]) = unknowns_.row(i); });
   return report;
 }
 

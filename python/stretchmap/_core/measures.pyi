@@ -2,7 +2,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ElementMeasures', 'face_measures', 'ring_sums', 'tet_measures']
+__all__: list[str] = ['ElementMeasures', 'ShareDeviations', 'direction_scatter', 'face_measures', 'ring_sums', 'share_deviations', 'tet_measures']
 class ElementMeasures:
     @property
     def angle(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -16,9 +16,20 @@ class ElementMeasures:
     @property
     def source(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         ...
+class ShareDeviations:
+    @property
+    def elements(self) -> float:
+        ...
+    @property
+    def rings(self) -> float:
+        ...
+def direction_scatter(directions: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], metric: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+    ...
 def face_measures(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], image: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], sign: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> ElementMeasures:
     ...
 def ring_sums(elements: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]", "flags.c_contiguous"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    ...
+def share_deviations(elements: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]", "flags.c_contiguous"], shares: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], rings: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], sizes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> ShareDeviations:
     ...
 def tet_measures(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], image: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> ElementMeasures:
     ...

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
+
 __all__ = ["unstretching"]
 
 _SAMPLE = 20_000  # tets
@@ -41,8 +43,7 @@ def unstretching(V: NDArray[np.float64], T: NDArray[np.int32]) -> NDArray[np.flo
     edges = edges / np.linalg.norm(edges, axis=1, keepdims=True).mean()
     scatter = np.eye(3)
     for _ in range(_STEPS):
-        lengths = np.einsum("ei,ij,ej->e", edges, np.linalg.inv(scatter), edges)
-        new = np.einsum("ei,ej,e->ij", edges, edges, 1.0 / lengths)
+        new = _core.measures.direction_scatter(edges, np.linalg.inv(scatter))
         new *= 3.0 / np.trace(new)
         done = np.abs(new - scatter).max() <= _TOL * np.linalg.eigvalsh(new)[0]
         scatter = new

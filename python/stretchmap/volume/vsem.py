@@ -103,7 +103,7 @@ def minimize_volumetric_stretch(
     def record(x: NDArray[np.float64], iteration: int, residual: float) -> float:
         volumes = _core.mesh.tet_volumes(x, T)
         energy = float(_core.volume.tet_stretch_energy(volumes, rest))
-        image_shares = volumes / volumes.sum()
+        deviations = _core.measures.share_deviations(T, shares, rings, volumes)
         history.append(
             IterationRecord(
                 stage="vsem",
@@ -111,8 +111,8 @@ def minimize_volumetric_stretch(
                 energy=energy,
                 residual=residual,
                 flips=int(np.count_nonzero(~(volumes > 0.0))),
-                ring_std=float((_core.measures.ring_sums(T, image_shares, len(V)) / rings).std()),
-                element_std=float((image_shares / shares).std()),
+                ring_std=deviations.rings,
+                element_std=deviations.elements,
                 seconds=time.perf_counter() - clock,
             )
         )
