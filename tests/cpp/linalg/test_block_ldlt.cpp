@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/threads.hpp"
 #include "stretchmap/linalg/block_ldlt.hpp"
 #include "support/shapes.hpp"
 
@@ -73,6 +74,22 @@ TEST_CASE("the residual is small where separators and borders are many") {
   CHECK((matrix * solution - right).norm() < 1e-9 * right.norm());
   factor.factorize(2.0 * matrix);
   CHECK((2.0 * factor.solve(right) - solution).norm() < 1e-12 * solution.norm());
+}
+
+TEST_CASE("factors and solutions have the same bits with any number of threads") {
+  const SparseMatrix matrix = block_system(3, true, 90, 47);
+  const Vec right = tests::random_points(static_cast<Index>(matrix.rows()), 4).col(2);
+  const auto solved = [&](int threads) {
+    const int before = thread_count();
+    set_thread_count(threads);
+    linalg::BlockLdlt<3> factor(matrix);
+    factor.factorize(matrix);
+    const Vec solution = factor.solve(right);
+    set_thread_count(before);
+    return solution;
+  };
+  const Vec one = solved(1);
+  for (const int threads : {2, 3, 8}) CHECK((solved(threads).array() == one.array()).all());
 }
 
 TEST_CASE("a singular pivot is an error") {

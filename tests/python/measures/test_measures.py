@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import reference as ref
-from stretchmap import TetMesh, Torus, TriMesh, distortion
+from stretchmap import TetMesh, Torus, TriMesh, _core, distortion, samples
 from stretchmap.errors import (
     ArrayError,
     DegenerateError,
@@ -217,3 +217,26 @@ def test_same_bits_twice(load_solid):
     a, b = distortion(mesh, image), distortion(mesh, image)
     assert a.to_dict() == b.to_dict()
     assert "ring std" in a.summary()
+
+
+def test_deviations_of_shares_against_numpy():
+    """On enough tets for several parts of the sums round the vertices."""
+    solid = samples.solid_torus(40_000)
+    sizes = np.random.default_rng(5).uniform(0.5, 2.0, solid.n_tets)
+    shares = solid.tet_volumes / solid.tet_volumes.sum()
+    rings = _core.measures.ring_sums(solid.T, shares, solid.n_vertices)
+    found = _core.measures.share_deviations(solid.T, shares, rings, sizes)
+    image = np.zeros(solid.n_vertices)
+    np.add.at(image, solid.T, (sizes / sizes.sum())[:, None])
+    assert found.rings == pytest.approx((image / rings).std(), rel=1e-12)
+    assert found.elements == pytest.approx((sizes / sizes.sum() / shares).std(), rel=1e-12)
+
+
+def test_the_scatter_of_directions_against_numpy():
+    rng = np.random.default_rng(6)
+    directions, half = rng.normal(size=(5000, 3)), rng.normal(size=(3, 3))
+    metric = half @ half.T + np.eye(3)
+    found = _core.measures.direction_scatter(directions, metric)
+    lengths = np.einsum("ei,ij,ej->e", directions, metric, directions)
+    expected = np.einsum("ei,ej,e->ij", directions, directions, 1.0 / lengths)
+    assert found == pytest.approx(expected, rel=1e-12)
