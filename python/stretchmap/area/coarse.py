@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..base.torus import TWO_PI
+from ..base.torus import TWO_PI, Torus
 from ..mesh.meshes import TriMesh
 from .flat import start_angles
 
@@ -64,7 +64,18 @@ class Level:
 
     def newton(self, angles: NDArray[np.float64], ratio: float) -> _core.area.SurfaceNewton:
         """Newton steps on the polyhedral image from angles without folds in the chart."""
-        problem = _core.area.GlideProblem(self.chart, self.reference, ratio)
+        return self._newton(self.reference, angles, ratio)
+
+    def keeping(self, angles: NDArray[np.float64], ratio: float) -> _core.area.SurfaceNewton:
+        """The same, but every face is to keep the area and shape that its image has there."""
+        image = Torus(ratio, 1.0).xi(*angles.T)
+        reference = _core.area.SurfaceReference(image, self.chart.faces, _MAX_ASPECT)
+        return self._newton(reference, angles, ratio)
+
+    def _newton(
+        self, reference: _core.area.SurfaceReference, angles: NDArray[np.float64], ratio: float
+    ) -> _core.area.SurfaceNewton:
+        problem = _core.area.GlideProblem(self.chart, reference, ratio)
         return _core.area.SurfaceNewton(problem, angles)
 
     def prolonged(self, angles: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:

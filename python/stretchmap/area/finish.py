@@ -7,9 +7,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .. import _core
 from ..base.progress import Progress, report
+from ..errors import DegenerateError
 from ..maps.history import IterationRecord
+from .coarse import Level
 
 # Weights of the finishing energy against which the area term grows.
 _SHAPE = 0.1
@@ -29,18 +34,48 @@ _FAIR = 2.0  # from this face SD on, in units of tol, the shape budget counts
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 
 UNFOLD_STEPS = 100
+# Where faces that keep what they have could be unfolded at all, it took up to 24.
+KEEPING_STEPS = 30
 _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing any more
 _EPSILON = 0.2  # of the worst face
 _LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
 
 
-def unfold_faces(
-    newton: _core.area.SurfaceNewton, progress: Progress | None, steps: int = UNFOLD_STEPS
-) -> list[IterationRecord]:
-    """Newton steps on the regularized energy until every face looks outward, or no step is left.
+def unfolded(
+    level: Level,
+    angles: NDArray[np.float64],
+    ratio: float,
+    progress: Progress | None,
+    *,
+    keep: bool = False,
+) -> tuple[_core.area.SurfaceNewton, list[IterationRecord]]:
+    """What goes on from there, every face looking outward if steps lead there; records.
 
     Faces too coarse for their place turn inward when the flat chart is wrapped round the torus.
+    Either all are to get equal areas meanwhile; or, if that leaves some folded or with ``keep``, to
+    keep what area and shape they have there, which takes few steps and folds no others.
     """
+    newton = level.newton(angles, ratio)
+    if newton.least_facing() > 0.0:
+        return newton, []
+    tried = [] if keep else unfold_faces(newton, UNFOLD_STEPS, progress)
+    if newton.least_facing() > 0.0:
+        return newton, tried
+    try:
+        keeping = level.keeping(angles, ratio)
+    except DegenerateError:  # a face whose area is lost in rounding cannot keep it
+        return newton, tried
+    history = unfold_faces(keeping, KEEPING_STEPS, progress)
+    if keeping.least_facing() > 0.0 or keep:
+        newton = level.newton(keeping.angles, ratio)
+    # They compare areas with those to be kept.
+    return newton, tried + [replace(r, ring_std=math.nan, element_std=math.nan) for r in history]
+
+
+def unfold_faces(
+    newton: _core.area.SurfaceNewton, steps: int, progress: Progress | None
+) -> list[IterationRecord]:
+    """Newton steps on the regularized energy until every face looks outward, or no step is left."""
     start = time.perf_counter()
     history: list[IterationRecord] = []
     short = 0

@@ -8,6 +8,9 @@ import math
 import time
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..base.arrays import read_only
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
@@ -17,9 +20,10 @@ from ..certificate.checks import certify
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import CertificationError, OptionError, SolverError
 from ..homology.basis import HomologyBasis
+from ..maps.history import IterationRecord
 from ..mesh.given import as_surface, require_same_mesh
 from .coarse import Level, levels
-from .finish import UNFOLD_STEPS, Steps, finish_areas, unfold_faces
+from .finish import Steps, finish_areas, unfolded
 from .flat import unfolded_turns
 from .result import AreaMap
 from .route import EqualAreas, Finish, Made, Route, follow
@@ -28,7 +32,7 @@ from .search import Ratio
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["SHAPES", "Finish", "area_map", "charted", "equal_areas", "finished"]
+__all__ = ["SHAPES", "Finish", "area_map", "charted", "equal_areas", "finished", "turned"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -181,7 +185,8 @@ def _along(
     finest = equal.level
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
-    made = follow(route, levels(finest), progress)
+    stack = levels(finest)
+    made = follow(route, stack, progress, equal if len(stack) == 1 else None)
     found = _result(surface, conformal, made, torus)
     for shape in SHAPES:
         if found.certificate.certified or not _folded(found):
@@ -266,29 +271,41 @@ def _start(
 
 
 def finished(
-    start: AreaMap,
-    *,
-    max_iter: int,
-    tol: float,
-    progress: Progress | None = None,
-    unfold_iter: int = UNFOLD_STEPS,
+    start: AreaMap, *, max_iter: int, tol: float, progress: Progress | None = None
 ) -> AreaMap:
     """An unfinished map with its folded faces turned, and up to ``max_iter`` steps on the areas."""
     clock = time.perf_counter()
-    level = Level.of(start.mesh, start.angles / TWO_PI, start.forms, start.ratio)
-    newton = level.newton(start.angles, start.ratio)
-    unfolding = unfold_faces(newton, progress, unfold_iter)
+    level = _level_of(start)
+    newton, unfolding = unfolded(level, start.angles, start.ratio, progress)
     steps = Steps(max_iter, tol, math.inf)
     records, converged, reason = finish_areas(newton, False, steps, progress)
-    image = start.torus.xi(newton.angles[:, 0], newton.angles[:, 1])
+    found = _moved(start, newton.angles, unfolding + records, clock)
+    return dataclasses.replace(found, converged=converged, stop_reason=reason)
+
+
+def turned(start: AreaMap, progress: Progress | None = None) -> AreaMap:
+    """An unfinished map with its folded faces turned, all others as they are as far as can be."""
+    clock = time.perf_counter()
+    newton, records = unfolded(_level_of(start), start.angles, start.ratio, progress, keep=True)
+    if not records:
+        return start
+    return _moved(start, newton.angles, records, clock)
+
+
+def _level_of(found: AreaMap) -> Level:
+    return Level.of(found.mesh, found.angles / TWO_PI, found.forms, found.ratio)
+
+
+def _moved(
+    start: AreaMap, angles: NDArray[np.float64], records: list[IterationRecord], clock: float
+) -> AreaMap:
+    image = start.torus.xi(angles[:, 0], angles[:, 1])
     return dataclasses.replace(
         start,
-        angles=read_only(newton.angles),
+        angles=read_only(angles),
         image=read_only(image),
         certificate=certify(start.mesh, image, start.torus),
-        history=start.history + tuple(unfolding + records),
-        converged=converged,
-        stop_reason=reason,
+        history=start.history + tuple(records),
         seconds={**start.seconds, "finish": time.perf_counter() - clock},
     )
 

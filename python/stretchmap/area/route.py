@@ -15,7 +15,7 @@ from ..base.progress import Progress
 from ..maps.history import IterationRecord
 from .balance import JAMMED, balance_areas
 from .coarse import Folded, Level
-from .finish import Pace, Steps, finish_areas, unfold_faces
+from .finish import Pace, Steps, finish_areas, unfolded
 from .flat import start_angles
 from .search import Ratio, search_phase
 from .sem import minimize_stretch
@@ -117,8 +117,8 @@ def _climb(route: Route, stack: list[Level], equal: EqualAreas, progress: Progre
         if level.coarse is not None:
             made.angles = level.prolonged(made.angles, ratio)
             pace = pace.finer()
-        newton = level.newton(made.angles, ratio)
-        made.add(unfold_faces(newton, progress), finest)
+        newton, unfolding = unfolded(level, made.angles, ratio, progress, keep=route.shape > 0.0)
+        made.add(unfolding, finest)
         records, made.converged, made.reason = finish_areas(
             newton, finest and route.finish == "ring", steps, progress, pace
         )

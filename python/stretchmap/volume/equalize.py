@@ -60,6 +60,8 @@ def equalize(
     volumes = _core.mesh.tet_volumes(x, model.T)
     measured = marginals.measure(x)
     for iteration in range(total):
+        if history.budget.spent:
+            break
         if iteration < o.target_iter:
             if marginals.error(measured) < o.marginal_tol:
                 continue

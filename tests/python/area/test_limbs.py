@@ -98,4 +98,4 @@ def test_unfolding_that_is_jammed_ends(monkeypatch, lengths, taken):
         step=lambda _: SimpleNamespace(step=next(given)),
         measures=lambda: None,
     )
-    assert len(finish.unfold_faces(newton, None)) == taken
+    assert len(finish.unfold_faces(newton, 100, None)) == taken

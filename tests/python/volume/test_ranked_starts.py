@@ -162,71 +162,41 @@ def test_a_start_that_cannot_be_made_is_passed_over(monkeypatch):
         next(boundary_starts(SOLID, VolumeOptions(), glide=True, progress=None))
 
 
-def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch, plain):
-    def chart(least):
-        def made(_, ratio, shape=0.0):
-            kept = SimpleNamespace(ratios=np.array([1.0, least]))
-            certified = SimpleNamespace(certified=shape != 10.0, ids={})
-            return SimpleNamespace(ratio=ratio, shape=shape, certificate=certified, distortion=kept)
+def charts(least: float = 1.0, outward: float = 0.0):
+    """For `_BoundaryMaps._chart`; faces are folded where the ratio of radii is below that."""
 
-        return made
+    def made(_, ratio, shape=0.0):
+        kept = SimpleNamespace(ratios=np.array([1.0, least]))
+        return SimpleNamespace(
+            ratio=ratio, shape=shape, distortion=kept, folded=int(ratio < outward)
+        )
 
+    return made
+
+
+def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch):
     maps = boundary_starts_module._BoundaryMaps(SOLID.surface, VolumeOptions(), None)
-    monkeypatch.setattr(boundary_starts_module, "finished", lambda found, **_: (found.shape,))
-    monkeypatch.setattr(type(maps), "_not_outward", lambda *_: 1)
-    monkeypatch.setattr(type(maps), "_chart", chart(1e-3))
+    monkeypatch.setattr(boundary_starts_module, "turned", lambda found, _: found)
+    monkeypatch.setattr(type(maps), "_not_outward", lambda _, found: found.folded)
+    monkeypatch.setattr(type(maps), "_chart", charts(1e-3))
     assert maps.gentle(2.0).shape == 100.0
-    monkeypatch.setattr(type(maps), "_chart", chart(1e-20))
-    assert maps.gentle(2.0) == (10.0,)
+    monkeypatch.setattr(type(maps), "_chart", charts(1e-20))
+    assert maps.gentle(2.0).shape == 10.0
 
 
-def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch):
-    tried = []
-
-    def chart(_, ratio, shape=0.0):
-        tried.append((round(ratio / 1.5, 9), shape))
-        certified = SimpleNamespace(certified=ratio > 3.0, ids={})
-        kept = SimpleNamespace(ratios=np.ones(1))
-        return SimpleNamespace(ratio=ratio, certificate=certified, distortion=kept)
-
+@pytest.mark.parametrize(("outward", "ratio"), [(1.0, 1.5), (3.0, 3.75), (9.0, None)])
+def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch, outward, ratio):
+    turned = []
     maps = boundary_starts_module._BoundaryMaps
+    monkeypatch.setattr(boundary_starts_module, "turned", lambda one, _: turned.append(one) or one)
     monkeypatch.setattr(maps, "fatter_ratio", 1.5)
     made = maps(SOLID.surface, VolumeOptions(), None)
-    monkeypatch.setattr(maps, "_chart", chart)
-    assert made.gentle_on_fatter().ratio == 3.75
-    assert tried == [(1.0, 100.0), (1.0, 1000.0), (1.6, 100.0), (1.6, 1000.0), (2.5, 100.0)]
-
-
-def test_where_kept_shapes_fold_on_every_torus_the_folded_faces_are_turned(monkeypatch):
-    def chart(_, ratio, shape=0.0):
-        certified = SimpleNamespace(certified=False)
-        kept = SimpleNamespace(ratios=np.ones(1))
-        return SimpleNamespace(ratio=ratio, shape=shape, certificate=certified, distortion=kept)
-
-    def finished(found, **_):
-        found.history = [SimpleNamespace(flips=int(found.ratio < 2.0))]
-        return found
-
-    maps = boundary_starts_module._BoundaryMaps
-    monkeypatch.setattr(maps, "fatter_ratio", 1.5)
-    made = maps(SOLID.surface, VolumeOptions(), None)
-    monkeypatch.setattr(maps, "_chart", chart)
-    monkeypatch.setattr(maps, "_not_outward", lambda *_: 1)
-    monkeypatch.setattr(boundary_starts_module, "finished", finished)
+    monkeypatch.setattr(maps, "_chart", charts(outward=outward))
+    monkeypatch.setattr(maps, "_not_outward", lambda _, found: found.folded)
     found = made.gentle_on_fatter()
-    assert (found.ratio, found.shape) == (1.6 * 1.5, 1000.0)
-    monkeypatch.setattr(maps, "_not_outward", lambda *_: len(SOLID.surface.F))
-    assert made.gentle_on_fatter() is None
-    certified = SimpleNamespace(certified=True)
-
-    def heavier(_, ratio, shape=0.0):
-        found = chart(_, ratio, shape)
-        found.certificate = certified if shape > 1e3 and ratio > 3.0 else found.certificate
-        return found
-
-    monkeypatch.setattr(maps, "_chart", heavier)
-    found = made.gentle_on_fatter()
-    assert (found.ratio, found.shape) == (2.5 * 1.5, 1e4)
+    assert (found and found.ratio) == ratio
+    assert [one.ratio for one in turned] == pytest.approx([1.5, 2.4, 3.75][: len(turned)])
+    assert len(turned) == (1 if ratio == 1.5 else 3)
 
 
 def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
@@ -244,10 +214,10 @@ def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
 
 
 @pytest.mark.parametrize("folded", [True, False])
-def test_kept_shapes_come_before_equal_areas_where_faces_were_turned(monkeypatch, plain, folded):
+def test_kept_shapes_come_before_equal_areas_where_faces_were_turned(monkeypatch, folded):
     maps = boundary_starts_module._BoundaryMaps(SOLID.surface, VolumeOptions(), None)
-    left = [SimpleNamespace(flips=int(folded))]
-    monkeypatch.setattr(maps, "first", SimpleNamespace(history=left, certificate=plain.certificate))
+    monkeypatch.setattr(maps, "_not_outward", lambda _: int(folded))
+    monkeypatch.setattr(boundary_starts_module, "turned", lambda found, _: found)
     makers = maps.gliding()
     assert (next(makers)() is None) == folded
     order = [next(makers), next(makers)]
