@@ -11,6 +11,8 @@
 namespace stretchmap::area {
 namespace {
 
+// Results keep the arrays they get: not those of the systems below, whose factors would live as
+// long.
 void bind_chart(py::module_& m) {
   py::class_<SurfaceChart>(m, "SurfaceChart")
       .def(py::init([](const mesh::SurfaceTopology& top, const IndexRows& forms) {
@@ -51,7 +53,7 @@ void bind_sem(py::module_& m) {
            py::arg("areas"), py::arg("aspect"), py::arg("turns"), release_gil())
       .def("step", &SurfaceSem::step, release_gil())
       .def("measures", &SurfaceSem::measures, release_gil())
-      .def_property_readonly("turns", &SurfaceSem::turns);
+      .def_property_readonly("turns", &SurfaceSem::turns, py::return_value_policy::copy);
 }
 
 void bind_chart_newton(py::module_& m) {
@@ -71,7 +73,7 @@ void bind_chart_newton(py::module_& m) {
           },
           py::arg("area"), py::arg("shape"), py::arg("reach"), release_gil())
       .def("measures", &ChartNewton::measures, release_gil())
-      .def_property_readonly("turns", &ChartNewton::turns);
+      .def_property_readonly("turns", &ChartNewton::turns, py::return_value_policy::copy);
 }
 
 void bind_quality(py::module_& m) {
@@ -122,7 +124,7 @@ void bind_glide(py::module_& m) {
           release_gil())
       .def("measures", &SurfaceNewton::measures, release_gil())
       .def("least_facing", &SurfaceNewton::facing, release_gil())
-      .def_property_readonly("angles", &SurfaceNewton::angles);
+      .def_property_readonly("angles", &SurfaceNewton::angles, py::return_value_policy::copy);
 }
 
 }  // namespace

@@ -74,6 +74,7 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
 
 bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std, double face_error,
                                   int best_steps, const Poll& poll) {
+  system_.let_go();
   if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
   const SurfaceMeasures before = measures();
@@ -98,8 +99,10 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std
   }
   if (now.flips <= before.flips && now.ring_std <= kRingGoal &&
       now.face_std <= std::max(before.face_std, face_std) &&
-      now.face_error <= std::max(before.face_error, face_error))
+      now.face_error <= std::max(before.face_error, face_error)) {
+    rings_.reset();
     return true;
+  }
   angles_ = start;
   return false;
 }

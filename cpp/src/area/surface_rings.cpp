@@ -104,11 +104,14 @@ Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weig
   if (kind != RingStep::kAgain) {
     SurfaceWeights model = weights;
     if (kind == RingStep::kStiff) model.area = 0.0;
-    const GlideEnergy energy = glide_energy(problem, model, scale, angles, Derivatives::kModel);
+    if (factor_) factor_->let_go();
     exact_ = pattern_.zeros();
-    pattern_.scatter(elements(problem, rings, energy.hessians), exact_.valuePtr());
-    for (Index i = 0; i < n && kind == RingStep::kBest; ++i)
-      right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
+    {  // what the matrix is made of is as large as its factor
+      GlideEnergy energy = glide_energy(problem, model, scale, angles, Derivatives::kModel);
+      for (Index i = 0; i < n && kind == RingStep::kBest; ++i)
+        right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
+      pattern_.scatter(elements(problem, rings, energy.hessians), exact_.valuePtr());
+    }
     const SparseMatrix yielding = with_give(exact_);
     if (!factor_) factor_.emplace(yielding);
     factor_->factorize(yielding, poll);

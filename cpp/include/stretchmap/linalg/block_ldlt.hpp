@@ -24,6 +24,9 @@ class BlockLdlt {
   // \throws Error "SolverError" for a pivot that is zero or not finite.
   void factorize(const SparseMatrix& A, const Poll& poll = {});
 
+  // Lets the numbers go until the next factorize.
+  void let_go() { values_.reset(); }
+
   // \pre factorize was called.
   Vec solve(const VecRef& right) const;
 
@@ -54,6 +57,7 @@ class BlockLdlt {
   std::vector<Front> fronts_;                   // children before their parents
   std::vector<std::pair<Index, Index>> trees_;  // ranges of fronts that are subtrees of their own
   std::vector<Index> top_;                      // fronts in none of them, ascending
+  std::size_t total_ = 0;                       // numbers of all panels
   std::unique_ptr<double[]> values_;
 };
 

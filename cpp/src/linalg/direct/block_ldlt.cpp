@@ -59,7 +59,6 @@ BlockLdlt<K>::BlockLdlt(const SparseMatrix& A) : n_(static_cast<Index>(A.rows())
 
 template <int K>
 void BlockLdlt<K>::find_borders(const SparseMatrix& A) {
-  std::size_t total = 0;
   for (Front& front : fronts_) {
     std::vector<Index>& border = front.border;
     for (Index k = front.first; k < front.last; ++k) {
@@ -74,11 +73,9 @@ void BlockLdlt<K>::find_borders(const SparseMatrix& A) {
     std::sort(border.begin(), border.end());
     border.erase(std::unique(border.begin(), border.end()), border.end());
     border.shrink_to_fit();
-    front.start = total;
-    total += static_cast<std::size_t>(K * K) * front.size() * front.own();
+    front.start = total_;
+    total_ += static_cast<std::size_t>(K * K) * front.size() * front.own();
   }
-  // Set when factorized, by the threads that work there; all this memory at once takes longer.
-  values_.reset(new double[total]);
 }
 
 // Subtrees of moderate size, each for one thread; the few large fronts above them are for all.
@@ -169,6 +166,8 @@ void BlockLdlt<K>::eliminate(const SparseMatrix& A, Index f, std::vector<Leftove
 
 template <int K>
 void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
+  // Not set to zero here: the threads do that, each where it works.
+  if (!values_) values_.reset(new double[total_]);
   std::vector<Leftover> leftovers(fronts_.size());
   std::vector<std::exception_ptr> failed(trees_.size());
   if (poll) poll();
