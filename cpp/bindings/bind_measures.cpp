@@ -19,7 +19,7 @@ void bind(py::module_& m) {
       .def_readonly("rings", &ShareDeviations::rings)
       .def_readonly("elements", &ShareDeviations::elements);
   m.def("share_deviations", &share_deviations, py::arg("elements").noconvert(),
-        py::arg("shares").noconvert(), py::arg("rings").noconvert(), py::arg("sizes").noconvert(),
+        py::arg("source").noconvert(), py::arg("rings").noconvert(), py::arg("image").noconvert(),
         release_gil());
   m.def("direction_scatter", &direction_scatter, py::arg("directions").noconvert(),
         py::arg("metric"), release_gil());

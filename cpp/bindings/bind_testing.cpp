@@ -117,7 +117,7 @@ void bind_area(py::module_& m) {
             area::glide_energy(problem, {area, shape, chart, facing, epsilon}, scale, angles,
                                model ? area::Derivatives::kModel : area::Derivatives::kHessian);
         const area::SurfacePattern pattern(problem.chart.faces, problem.chart.n_vertices, 2);
-        SparseMatrix hessian = pattern.zeros();
+        SparseMatrix hessian = pattern.matrix();
         pattern.scatter(energy.hessians, hessian.valuePtr());
         return std::make_tuple(energy.value, std::move(energy.gradient), std::move(hessian));
       },

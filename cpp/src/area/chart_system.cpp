@@ -5,7 +5,7 @@
 namespace stretchmap::area {
 
 Vec ChartSystem::solve(const Rows& hessians, const Vec& gradient, const Poll& poll) {
-  SparseMatrix matrix = pattern_.zeros();
+  SparseMatrix& matrix = pattern_.matrix();
   pattern_.scatter(hessians, matrix.valuePtr());
   const double ridge = ridge_ * Vec(matrix.diagonal()).mean();
   for_rows(static_cast<Index>(matrix.rows()), [&](Index i) { matrix.coeffRef(i, i) += ridge; });

@@ -33,9 +33,7 @@ Points2 without_rotation(Points2 direction) {
 }  // namespace
 
 SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
-    : problem_(std::move(problem)),
-      angles_(std::move(angles)),
-      system_(problem_.chart.faces, problem_.chart.n_vertices, kHoldRotation) {
+    : problem_(std::move(problem)), angles_(std::move(angles)) {
   const std::vector<Index> faces = folded_faces(problem_.chart, angles_ / kTwoPi);
   if (!faces.empty())
     throw Error("SolverError", "faces are flipped in the chart; Newton steps need a start without",
@@ -45,7 +43,9 @@ SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
 NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
   const double scale = best_scale(problem_, angles_);
   const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
-  const Vec flat = system_.solve(here.hessians, here.gradient, poll);
+  rings_.reset();
+  if (!system_) system_.emplace(problem_.chart.faces, problem_.chart.n_vertices, kHoldRotation);
+  const Vec flat = system_->solve(here.hessians, here.gradient, poll);
   const Points2 direction = without_rotation(as_rows(flat));
 
   const double slope = here.gradient.dot(flat);
@@ -74,7 +74,7 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
 
 bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std, double face_error,
                                   int best_steps, const Poll& poll) {
-  system_.let_go();
+  system_.reset();
   if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
   const SurfaceMeasures before = measures();

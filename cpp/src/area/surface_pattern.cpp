@@ -8,25 +8,25 @@
 namespace stretchmap::area {
 
 SurfacePattern::SurfacePattern(const FacesRef& faces, Index n, int block)
-    : block_(block), zeros_(n * block, n * block), corners_(corners_at(faces, n)) {
+    : block_(block), matrix_(n * block, n * block), corners_(corners_at(faces, n)) {
   const linalg::Pattern rows = linalg::build_pattern(n, n, [&](Index i, linalg::RowSet& set) {
     for (const Index corner : corners_[i])
       for (int l = 0; l < 3; ++l) set.add(faces(corner / 3, l));
   });
   const Index entries = 3 * block * block;  // of a face in the rows of one of its vertices
-  zeros_.resizeNonZeros(block * block * rows.start[n]);
+  matrix_.resizeNonZeros(block * block * rows.start[n]);
   slot_.resize(static_cast<std::size_t>(faces.rows()) * 3 * entries);
-  zeros_.outerIndexPtr()[0] = 0;
+  matrix_.outerIndexPtr()[0] = 0;
   for_rows(n, kElementChunk, [&](Index i) {
     const auto first = rows.col.begin() + rows.start[i],
                last = rows.col.begin() + rows.start[i + 1];
     const Index start = block * block * rows.start[i];
     const Index width = block * static_cast<Index>(last - first);
     for (int c = 0; c < block; ++c) {
-      zeros_.outerIndexPtr()[block * i + c + 1] = start + (c + 1) * width;
+      matrix_.outerIndexPtr()[block * i + c + 1] = start + (c + 1) * width;
       for (Index e = 0; e < width; ++e) {
-        zeros_.innerIndexPtr()[start + c * width + e] = block * first[e / block] + e % block;
-        zeros_.valuePtr()[start + c * width + e] = 0.0;
+        matrix_.innerIndexPtr()[start + c * width + e] = block * first[e / block] + e % block;
+        matrix_.valuePtr()[start + c * width + e] = 0.0;
       }
     }
     for (const Index corner : corners_[i]) {
@@ -44,8 +44,8 @@ SurfacePattern::SurfacePattern(const FacesRef& faces, Index n, int block)
 // Row by row, so that threads share them.
 void SurfacePattern::scatter(const RowsRef& elements, double* values) const {
   const Index entries = 3 * block_ * block_;
-  const Index* start = zeros_.outerIndexPtr();
-  for_rows(static_cast<Index>(zeros_.rows()) / block_, kElementChunk, [&](Index i) {
+  const Index* start = matrix_.outerIndexPtr();
+  for_rows(static_cast<Index>(matrix_.rows()) / block_, kElementChunk, [&](Index i) {
     std::fill(values + start[block_ * i], values + start[block_ * (i + 1)], 0.0);
     for (const Index corner : corners_[i]) {
       const auto first = static_cast<std::size_t>(corner) * entries;

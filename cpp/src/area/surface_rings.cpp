@@ -78,18 +78,23 @@ Vec product(const SparseMatrix& matrix, const Vec& x) {
   return result;
 }
 
-SparseMatrix with_give(SparseMatrix matrix) {
+Vec give_of(const SparseMatrix& matrix, const Vec& diagonal) {
   const Index n = static_cast<Index>(matrix.rows()) / 3;
-  const double size = Vec(matrix.diagonal()).sum() / (2.0 * n);
+  const double size = diagonal.sum() / (2.0 * n);
   Vec couplings(n);
   for_rows(n, kElementChunk,
            [&](Index i) { couplings(i) = matrix.row(3 * i + 2).squaredNorm() / n; });
   double coupling = 0.0;
   for (const double one : couplings) coupling += one;
-  for_rows(3 * n, [&](Index i) {
-    matrix.coeffRef(i, i) += i % 3 == 2 ? -kGive * coupling / size : kRingRidge * size;
-  });
-  return matrix;
+  Vec give(3 * n);
+  for (Index i = 0; i < 3 * n; ++i)
+    give(i) = i % 3 == 2 ? -kGive * coupling / size : kRingRidge * size;
+  return give;
+}
+
+void set_diagonal(SparseMatrix& matrix, const Vec& diagonal) {
+  for_rows(static_cast<Index>(matrix.rows()),
+           [&](Index i) { matrix.coeffRef(i, i) = diagonal(i); });
 }
 
 }  // namespace
@@ -101,24 +106,26 @@ Points2 RingSystem::step(const GlideProblem& problem, const SurfaceWeights& weig
   Vec right = Vec::Zero(3 * n);
   for (Index i = 0; i < n; ++i)
     right(3 * i + 2) = 1.0 - rings.image(i) / (rings.total * rings.source(i));
+  SparseMatrix& exact = pattern_.matrix();
   if (kind != RingStep::kAgain) {
     SurfaceWeights model = weights;
     if (kind == RingStep::kStiff) model.area = 0.0;
     if (factor_) factor_->let_go();
-    exact_ = pattern_.zeros();
     {  // what the matrix is made of is as large as its factor
       GlideEnergy energy = glide_energy(problem, model, scale, angles, Derivatives::kModel);
       for (Index i = 0; i < n && kind == RingStep::kBest; ++i)
         right.segment<2>(3 * i) = -energy.gradient.segment<2>(2 * i);
-      pattern_.scatter(elements(problem, rings, energy.hessians), exact_.valuePtr());
+      pattern_.scatter(elements(problem, rings, energy.hessians), exact.valuePtr());
     }
-    const SparseMatrix yielding = with_give(exact_);
-    if (!factor_) factor_.emplace(yielding);
-    factor_->factorize(yielding, poll);
+    const Vec diagonal = exact.diagonal();
+    set_diagonal(exact, diagonal + give_of(exact, diagonal));
+    if (!factor_) factor_.emplace(exact);
+    factor_->factorize(exact, poll);
+    set_diagonal(exact, diagonal);
   }
   Vec solution = factor_->solve(right);
   for (int i = 0; i < kRefinements; ++i) {
-    const Vec residual = right - product(exact_, solution);
+    const Vec residual = right - product(exact, solution);
     if (residual.norm() <= kAccuracy * right.norm()) break;
     solution += factor_->solve(residual);
   }

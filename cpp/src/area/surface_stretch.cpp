@@ -35,7 +35,7 @@ SparseMatrix assemble(const SurfacePattern& pattern, const VecRef& areas, const 
   for_rows(static_cast<Index>(areas.size()), kElementChunk, [&](Index f) {
     Eigen::Map<Eigen::Matrix3d>(elements.row(f).data()) = element(of(f), areas(f));
   });
-  SparseMatrix matrix = pattern.zeros();
+  SparseMatrix matrix = pattern.matrix();
   pattern.scatter(elements, matrix.valuePtr());
   return matrix;
 }

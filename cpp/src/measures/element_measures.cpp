@@ -102,25 +102,26 @@ double deviation(Index n, const Value& value) {
 
 }  // namespace
 
-ShareDeviations share_deviations(const Eigen::Ref<const IndexRows>& elements, const VecRef& shares,
-                                 const VecRef& rings, const VecRef& sizes) {
+ShareDeviations share_deviations(const Eigen::Ref<const IndexRows>& elements, const VecRef& source,
+                                 const VecRef& rings, const VecRef& image) {
   constexpr Index kLeast = 16384, kMost = 8;  // elements of a part, parts
   const Index m = static_cast<Index>(elements.rows()), n = static_cast<Index>(rings.size());
   const Index parts = std::clamp(chunk_count(m, kLeast), Index{1}, kMost);
   const Index size = chunk_count(m, parts);
-  const double total = sum_chunks<1>(m, [&](Index begin, Index end, std::array<double, 1>& sum) {
-    for (Index e = begin; e < end; ++e) sum[0] += sizes[e];
-  })[0];
-  Eigen::MatrixXd sums(n, parts);  // of the sizes round each vertex
+  const auto total = sum_chunks<2>(m, [&](Index begin, Index end, std::array<double, 2>& sum) {
+    for (Index e = begin; e < end; ++e) sum[0] += source[e], sum[1] += image[e];
+  });
+  const double scale = total[0] / total[1];
+  Eigen::MatrixXd sums(n, parts);  // of the image round each vertex
   for_tasks(parts, [&](Index part) {
     auto sum = sums.col(part);
     sum.setZero();
     for (Index e = part * size; e < std::min(m, (part + 1) * size); ++e)
-      for (Index k = 0; k < elements.cols(); ++k) sum[elements(e, k)] += sizes[e];
+      for (Index k = 0; k < elements.cols(); ++k) sum[elements(e, k)] += image[e];
   });
   for_rows(n, [&](Index i) { sums(i, 0) = sums.row(i).sum(); });
-  return {deviation(n, [&](Index i) { return sums(i, 0) / (total * rings[i]); }),
-          deviation(m, [&](Index e) { return sizes[e] / (total * shares[e]); })};
+  return {deviation(n, [&](Index i) { return scale * sums(i, 0) / rings[i]; }),
+          deviation(m, [&](Index e) { return scale * image[e] / source[e]; })};
 }
 
 Eigen::Matrix3d direction_scatter(const PointsRef& directions, const Eigen::Matrix3d& metric) {

@@ -95,15 +95,14 @@ def minimize_volumetric_stretch(
     """
     clock = time.perf_counter()
     rest = _core.mesh.tet_volumes(V, T)
-    shares = rest / rest.sum()
-    rings = _core.measures.ring_sums(T, shares, len(V))
+    rings = _core.measures.ring_sums(T, rest, len(V))
     stretch = _core.volume.VolumetricStretch(T, fixed, rest, solver)
     history: list[IterationRecord] = []
 
     def record(x: NDArray[np.float64], iteration: int, residual: float) -> float:
         volumes = _core.mesh.tet_volumes(x, T)
         energy = float(_core.volume.tet_stretch_energy(volumes, rest))
-        deviations = _core.measures.share_deviations(T, shares, rings, volumes)
+        deviations = _core.measures.share_deviations(T, rest, rings, volumes)
         history.append(
             IterationRecord(
                 stage="vsem",

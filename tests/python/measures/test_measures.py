@@ -225,7 +225,8 @@ def test_deviations_of_shares_against_numpy():
     sizes = np.random.default_rng(5).uniform(0.5, 2.0, solid.n_tets)
     shares = solid.tet_volumes / solid.tet_volumes.sum()
     rings = _core.measures.ring_sums(solid.T, shares, solid.n_vertices)
-    found = _core.measures.share_deviations(solid.T, shares, rings, sizes)
+    source = 3.0 * shares
+    found = _core.measures.share_deviations(solid.T, source, 3.0 * rings, sizes)
     image = np.zeros(solid.n_vertices)
     np.add.at(image, solid.T, (sizes / sizes.sum())[:, None])
     assert found.rings == pytest.approx((image / rings).std(), rel=1e-12)

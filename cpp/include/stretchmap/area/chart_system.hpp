@@ -15,7 +15,7 @@ struct NewtonStep {
   double decrement = 0.0;  // Newton decrement g' H^-1 g
 };
 
-// The symbolic analysis is kept from one step to the next.
+// The symbolic analysis is kept from the first step on.
 class ChartSystem {
  public:
   // \param ridge share of the mean diagonal that is added to it: holds what costs no energy.
@@ -26,9 +26,6 @@ class ChartSystem {
   // \return (2 n) -H^-1 gradient.
   // \throws Error "SolverError" when the factorization breaks down.
   Vec solve(const Rows& hessians, const Vec& gradient, const Poll& poll);
-
-  // Lets the factor go, which the next solve makes anew.
-  void let_go() { solver_.reset(); }
 
  private:
   SurfacePattern pattern_;

@@ -44,7 +44,7 @@ class SurfaceNewton {
 
   GlideProblem problem_;
   Points2 angles_;
-  ChartSystem system_;
+  std::optional<ChartSystem> system_;  // of these two one at a time
   std::optional<RingSystem> rings_;
 };
 

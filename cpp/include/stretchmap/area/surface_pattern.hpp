@@ -14,8 +14,9 @@ class SurfacePattern {
   // \param faces (m, 3) ids below n_vertices.
   SurfacePattern(const FacesRef& faces, Index n_vertices, int block);
 
-  // All zeros, both triangles stored.
-  const SparseMatrix& zeros() const { return zeros_; }
+  // With this pattern, both triangles stored; its values are for `scatter`.
+  SparseMatrix& matrix() { return matrix_; }
+  const SparseMatrix& matrix() const { return matrix_; }
 
   // Overwrites `values` with the sum over the faces, faces in order.
   // \param elements (m, (3 block)^2) row f is the matrix of face f, row-major, unknown c of its
@@ -24,7 +25,7 @@ class SurfacePattern {
 
  private:
   Index block_;
-  SparseMatrix zeros_;
+  SparseMatrix matrix_;
   Incidence<> corners_;      // of faces at each vertex
   std::vector<Index> slot_;  // m (3 block)^2 positions in the value array
 };

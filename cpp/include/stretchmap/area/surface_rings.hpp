@@ -31,8 +31,7 @@ class RingSystem {
                const Points2Ref& angles, RingStep kind, const Poll& poll = {});
 
  private:
-  SurfacePattern pattern_;
-  SparseMatrix exact_;                          // of the last step that was not kAgain
+  SurfacePattern pattern_;                      // and the matrix of the last step but kAgain
   std::optional<linalg::BlockLdlt<3>> factor_;  // from the first step on
 };
 

@@ -30,15 +30,14 @@ ElementMeasures tet_measures(const PointsRef& points, const TetsRef& tets, const
 // elements: (m, 3) or (m, 4). \pre ids in [0, n_vertices), values of length m.
 Vec ring_sums(const Eigen::Ref<const IndexRows>& elements, const VecRef& values, Index n_vertices);
 
-// Standard deviations of the ratios of shares, image to source.
+// Standard deviations of the ratios of shares of the total, image to source.
 struct ShareDeviations {
   double rings = 0.0, elements = 0.0;
 };
 
-// \param shares (m) of the elements in the source, `rings` (n) their ring_sums.
-// \param sizes (m) of the elements in the image.
-ShareDeviations share_deviations(const Eigen::Ref<const IndexRows>& elements, const VecRef& shares,
-                                 const VecRef& rings, const VecRef& sizes);
+// \param source (m) sizes of the elements, `rings` (n) their ring_sums; `image` (m) sizes there.
+ShareDeviations share_deviations(const Eigen::Ref<const IndexRows>& elements, const VecRef& source,
+                                 const VecRef& rings, const VecRef& image);
 
 // Sum of d d' / (d' metric d) over the rows d of `directions`.
 Eigen::Matrix3d direction_scatter(const PointsRef& directions, const Eigen::Matrix3d& metric);
