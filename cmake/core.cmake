@@ -1,11 +1,24 @@
 # The library of all numerics; knows nothing of Python.
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS cpp/src/*.cpp)
-add_library(stretchmap_core STATIC ${core_sources})
-target_include_directories(stretchmap_core PUBLIC cpp/include PRIVATE cpp/src)
 find_package(Threads REQUIRED)
-target_link_libraries(stretchmap_core PUBLIC Eigen3::Eigen Threads::Threads)
-target_compile_definitions(stretchmap_core PUBLIC EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
-target_precompile_headers(stretchmap_core PRIVATE <stretchmap/base/types.hpp> <string> <vector>)
+set(parts stretchmap_core)
+if(CMAKE_UNITY_BUILD)
+  # Units are a few rooms each: what they share of Eigen is compiled once, and so few units read
+  # their headers faster than a header is precompiled. Rooms in which a map spends next to no time
+  # are a part of their own, optimized less.
+  set(seldom ${core_sources})
+  list(FILTER seldom INCLUDE REGEX "/cpp/src/(certificate|forms|homology|mesh|partitions)/")
+  list(FILTER seldom EXCLUDE REGEX "/mesh/size.cpp")
+  list(REMOVE_ITEM core_sources ${seldom})
+  add_library(stretchmap_seldom OBJECT ${seldom})
+  list(APPEND parts stretchmap_seldom)
+endif()
+add_library(stretchmap_core STATIC ${core_sources})
+foreach(part IN LISTS parts)
+  target_include_directories(${part} PUBLIC cpp/include PRIVATE cpp/src)
+  target_link_libraries(${part} PUBLIC Eigen3::Eigen Threads::Threads)
+  target_compile_definitions(${part} PUBLIC EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
+endforeach()
 
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT CMAKE_OSX_ARCHITECTURES MATCHES "arm64")
   set(x86 ON)
@@ -15,19 +28,21 @@ endif()
 if(MSVC)
   # Templates make more sections than an object file has by default.
   set(warnings /W3)
-  target_compile_options(stretchmap_core PRIVATE ${warnings} /bigobj /utf-8)
+  set(options ${warnings} /bigobj /utf-8)
 else()
   set(warnings -Wall -Wextra -Wpedantic -Wshadow)
   set(strict $<$<BOOL:${STRETCHMAP_WERROR}>:-Werror>)
   # Nobody reads errno or traps: without them loops with roots and choices can be vectorized.
-  target_compile_options(stretchmap_core PRIVATE ${warnings} -fno-math-errno -fno-trapping-math
-                                                 ${strict})
+  set(options ${warnings} -fno-math-errno -fno-trapping-math ${strict})
   if(NOT x86)
     # The baseline of arm64 has a fused multiply-add: contraction would take the exactness from sums
     # that know their own rounding, those of the predicates first of all.
-    target_compile_options(stretchmap_core PRIVATE -ffp-contract=off)
+    list(APPEND options -ffp-contract=off)
   endif()
 endif()
+foreach(part IN LISTS parts)
+  target_compile_options(${part} PRIVATE ${options})
+endforeach()
 
 # Kernels for wider processors, chosen at run time. No contraction, so that all of them give the
 # same bits; and each by itself: with a precompiled header, or in one unit with others, GCC forgets
@@ -48,15 +63,22 @@ if(NOT MSVC)
   endif()
 endif()
 
-# With CMAKE_UNITY_BUILD, as wheels are built, each folder is one unit: what its files share of Eigen
-# is compiled once.
-set_target_properties(stretchmap_core PROPERTIES UNITY_BUILD_MODE GROUP)
-foreach(source IN LISTS core_sources)
-  get_filename_component(folder "${source}" DIRECTORY)
-  string(REGEX REPLACE ".*/cpp/src/" "" folder "${folder}")
-  string(REPLACE "/" "_" folder "${folder}")
-  set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder})
-endforeach()
+if(CMAKE_UNITY_BUILD)
+  set_target_properties(stretchmap_core PROPERTIES UNITY_BUILD_MODE GROUP)
+  set_source_files_properties(${core_sources} PROPERTIES UNITY_GROUP rooms)
+  foreach(room area linalg volume)
+    set(sources ${core_sources})
+    list(FILTER sources INCLUDE REGEX "/cpp/src/${room}/")
+    set_source_files_properties(${sources} PROPERTIES UNITY_GROUP ${room})
+  endforeach()
+  set_target_properties(stretchmap_seldom PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
+  target_sources(stretchmap_core PRIVATE $<TARGET_OBJECTS:stretchmap_seldom>)
+  if(NOT MSVC)
+    target_compile_options(stretchmap_seldom PRIVATE -O1)
+  endif()
+else()
+  target_precompile_headers(stretchmap_core PRIVATE <stretchmap/base/types.hpp> <string> <vector>)
+endif()
 
 if(STRETCHMAP_SANITIZE)
   target_compile_definitions(stretchmap_core PUBLIC _GLIBCXX_ASSERTIONS)
