@@ -5,6 +5,7 @@
 
 #include "linalg/iterative.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 
 namespace stretchmap::linalg {
 
@@ -65,17 +66,18 @@ void require_pattern(const BlockMatrix& A) {
 
 // The modes, zero for an unknown without any coupling: it takes no part in them.
 std::vector<double> masked_modes(const BlockMatrix& A, const RowsRef& near_nullspace) {
-  Rows modes = near_nullspace;
-  for (Index i = 0; i < A.rows(); ++i) {
+  std::vector<double> modes(near_nullspace.data(), near_nullspace.data() + near_nullspace.size());
+  const auto width = static_cast<std::size_t>(near_nullspace.cols());
+  for_rows(A.rows(), kElementChunk, [&](Index i) {
     bool coupled[3] = {false, false, false};
     for (Index e = A.row_ptr[i]; e < A.row_ptr[i + 1]; ++e)
       for (int k = 0; k < 9; ++k)
         if ((A.col[e] != i || k % 4 != 0) && A.values[9 * static_cast<Eigen::Index>(e) + k] != 0.0)
           coupled[k / 3] = true;
-    for (int r = 0; r < 3; ++r)
-      if (!coupled[r]) modes.row(3 * static_cast<Eigen::Index>(i) + r).setZero();
-  }
-  return {modes.data(), modes.data() + modes.size()};
+    for (std::size_t r = 0; r < 3; ++r)
+      if (!coupled[r]) std::fill_n(modes.data() + (3 * i + r) * width, width, 0.0);
+  });
+  return modes;
 }
 
 }  // namespace

@@ -22,10 +22,13 @@ IterativeSolver<B, M>::IterativeSolver(Index n, const Index* start, const Index*
 
 template <int B, int M>
 void IterativeSolver<B, M>::set_scale() {
-  double largest = 0.0;
-  for (Index entry : multigrid_.finest().diagonal_source)
-    for (int r = 0; r < B; ++r)
-      largest = std::max(largest, matrix_.value[static_cast<size_t>(B * B) * entry + (B + 1) * r]);
+  const std::vector<Index>& diagonal = multigrid_.finest().diagonal_source;
+  const double largest = -least_of(matrix_.n, 0.0, [&](Index i) {
+    const double* block = matrix_.value + static_cast<size_t>(B * B) * diagonal[i];
+    double most = block[0];
+    for (int r = 1; r < B; ++r) most = std::max(most, block[(B + 1) * r]);
+    return -most;
+  });
   const bool usable = largest > 0.0 && std::isfinite(largest);
   matrix_.scale = usable ? std::ldexp(1.0, -std::ilogb(largest)) : 1.0;
 }

@@ -107,8 +107,11 @@ EnergyReport SolidEnergy::summed(const Energies& found) {
     report.min_facing = found.facing.minCoeff();
     report.folds = static_cast<Index>((found.facing.array() <= 0.0).count());
   }
-  report.min_det = found.det.size() > 0 ? found.det.minCoeff() : 0.0;
-  report.flips = static_cast<Index>((found.det.array() <= 0.0).count());
+  const Index k = static_cast<Index>(found.det.size());
+  if (k == 0) return report;
+  report.min_det = least_of(k, found.det[0], [&](Index t) { return found.det[t]; });
+  if (!(report.min_det > 0.0))
+    report.flips = static_cast<Index>((found.det.array() <= 0.0).count());
   return report;
 }
 

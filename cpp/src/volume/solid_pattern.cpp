@@ -31,11 +31,9 @@ SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
   const double size = std::max((x.colwise().maxCoeff() - low).maxCoeff(), 1e-300);
   std::vector<std::uint32_t> code(n);
   std::vector<Index> active;
-  for (Index i = 0; i < n; ++i) {
-    if (motion_[i] == kFixed) continue;
-    code[i] = z_order((x.row(i) - low) / size);
-    active.push_back(i);
-  }
+  for_rows(n, [&](Index i) { code[i] = z_order((x.row(i) - low) / size); });
+  for (Index i = 0; i < n; ++i)
+    if (motion_[i] != kFixed) active.push_back(i);
   std::stable_sort(active.begin(), active.end(),
                    [&](Index a, Index b) { return code[a] < code[b]; });
   row_vertex_ = Eigen::Map<const IndexVec>(active.data(), static_cast<Index>(active.size()));
@@ -43,24 +41,21 @@ SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
   for (Index row = 0; row < row_vertex_.size(); ++row) vertex_row_[row_vertex_[row]] = row;
 
   // Tets by their lowest row, those without any at the end.
-  const auto lowest = [&](Index t) {
-    Index row = rows();
+  IndexVec lowest = IndexVec::Constant(k, rows());
+  for_rows(k, [&](Index t) {
     for (int a = 0; a < 4; ++a)
-      if (vertex_row_[tets(t, a)] >= 0) row = std::min(row, vertex_row_[tets(t, a)]);
-    return row;
-  };
-  const Incidence<> by_row(rows() + 1, [&](const auto& visit) {
-    for (Index t = 0; t < k; ++t) visit(lowest(t), t);
+      if (vertex_row_[tets(t, a)] >= 0) lowest[t] = std::min(lowest[t], vertex_row_[tets(t, a)]);
   });
+  const Incidence<> by_row = corners_at(lowest, rows() + 1);
   order_ = Eigen::Map<const IndexVec>(by_row.of(0, rows() + 1).begin(), k);
   tets_.resize(k, 4);
   rest_.resize(k, 9);
   weights_.resize(k);
-  for (Index t = 0; t < k; ++t) {
+  for_rows(k, [&](Index t) {
     tets_.row(t) = tets.row(order_[t]);
     rest_.row(t) = elements.rest.row(order_[t]);
     weights_[t] = elements.weights[order_[t]];
-  }
+  });
   number_sites();
 }
 
@@ -132,13 +127,13 @@ void SolidEnergy::part_rows() {
     part_row_[p] = static_cast<Index>(static_cast<std::int64_t>(n_rows) * p / parts);
   const auto touching = [&](const auto& elements) {
     std::vector<std::vector<Index>> lists(parts);
-    for (Index p = 0; p < parts; ++p) {
+    for_tasks(parts, [&](Index p) {
       const auto inside = [&](Index vertex) {
         return vertex_row_[vertex] >= part_row_[p] && vertex_row_[vertex] < part_row_[p + 1];
       };
       for (Index t = 0; t < elements.rows(); ++t)
         if (elements.row(t).unaryExpr(inside).any()) lists[p].push_back(t);
-    }
+    });
     return lists;
   };
   part_tets_ = touching(tets_);
@@ -160,7 +155,7 @@ linalg::BlockMatrix SolidEnergy::pattern() {
   linalg::BlockMatrix matrix;
   matrix.row_ptr = row_ptr_;
   matrix.col = col_;
-  matrix.values.setZero(9 * col_.size());
+  matrix.values.resize(9 * col_.size());
   return matrix;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "linalg/multigrid/block_products.hpp"
@@ -204,21 +205,20 @@ void add_row(const double* a, const Transfer<B, K>& t, Index j, const Index* slo
 // Rows [first, last) of A P.
 template <int B, int K>
 void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index last,
-                                   std::vector<double>& product) const {
+                                   double* product) const {
   constexpr size_t kSize = static_cast<size_t>(B) * K;
   const auto at = [&](Index i) { return kSize * (ap.start[i] - ap.start[first]); };
-  product.resize(at(last) + 1);  // see add_block_products
   for_chunks_with(
       last - first, kChunk / 8, [&] { return std::vector<Index>(aggregates.count); },
       [&](Index begin, Index end, std::vector<Index>& slot) {
-        std::fill(product.data() + at(first + begin), product.data() + at(first + end), 0.0);
+        std::fill(product + at(first + begin), product + at(first + end), 0.0);
         for (Index i = first + begin; i < first + end; ++i) {
           for (Index e = ap.start[i]; e < ap.start[i + 1]; ++e)
             slot[ap.col[e]] = e - ap.start[first];
           add_row(A.diagonal.data() + static_cast<size_t>(B * B) * i, *this, i, slot.data(),
-                  product.data());
+                  product);
           for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
-            add_row(A.block(e).data(), *this, A.col[e], slot.data(), product.data());
+            add_row(A.block(e).data(), *this, A.col[e], slot.data(), product);
         }
       });
 }
@@ -226,12 +226,17 @@ void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index l
 template <int B, int K>
 std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const {
   constexpr size_t kSize = static_cast<size_t>(B) * K, kCoarse = static_cast<size_t>(K) * K;
-  std::vector<double> values(kCoarse * coarse.col.size(), 0.0), product;
+  std::vector<double> values(kCoarse * coarse.col.size(), 0.0);
   std::vector<Index> next(r.start.begin(), r.start.end() - 1);  // first entry of r not yet added
   const Index at_once = std::max(kChunk, A.n / kParts + 1);
+  Index most = 0;
+  for (Index first = 0; first < A.n; first += at_once)
+    most = std::max(most, ap.start[std::min(A.n, first + at_once)] - ap.start[first]);
+  // Filled by the threads that need it; one more number, see add_block_products.
+  const std::unique_ptr<double[]> product(new double[kSize * most + 1]);
   for (Index first = 0; first < A.n; first += at_once) {
     const Index last = std::min(A.n, first + at_once);
-    multiply_rows(A, first, last, product);
+    multiply_rows(A, first, last, product.get());
     for_chunks_with(
         coarse.rows(), kChunk / 16, [&] { return std::vector<Index>(aggregates.count); },
         [&](Index begin, Index end, std::vector<Index>& slot) {
@@ -243,7 +248,7 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const
             for (; there(); ++e) {
               const Index i = r.col[e];
               const float* left = r_value.data() + kSize * e;
-              const double* right = product.data() + kSize * (ap.start[i] - ap.start[first]);
+              const double* right = product.get() + kSize * (ap.start[i] - ap.start[first]);
               if constexpr (B == 3 && K == 3) {
                 double transposed[9];
                 for (int k = 0; k < 9; ++k) transposed[k] = left[3 * (k % 3) + k / 3];

@@ -36,8 +36,7 @@ struct Transfer {
  private:
   std::vector<double> orthonormal(Index n, const std::vector<double>& modes);
   void set_patterns(const LevelMatrix<B>& A);
-  void multiply_rows(const LevelMatrix<B>& A, Index first, Index last,
-                     std::vector<double>& product) const;
+  void multiply_rows(const LevelMatrix<B>& A, Index first, Index last, double* product) const;
   void keep_regular(std::vector<double>& values) const;
 };
 
