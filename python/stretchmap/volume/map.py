@@ -33,8 +33,8 @@ __all__ = ["volume_map"]
 _log = logging.getLogger("stretchmap")
 
 # Peak resident bytes per tet of a whole call, mesh and result included, rounded up from what was
-# measured on generated solid tori of 1e6 tets: 594 and 1261 (493 for "vsem" at 1e7).
-_BYTES_PER_TET = {"vsem": 600, "certified": 1300}
+# measured on generated solid tori of 1e6 tets: 314 and 868.
+_BYTES_PER_TET = {"vsem": 320, "certified": 900}
 # Larger runs say beforehand how much they need.
 _LARGE = 1_000_000
 # Of the area map Algorithm 5.1 starts from. Rings are exact either way; the last per cent of the
@@ -125,7 +125,7 @@ def volume_map(
     Notes
     -----
     Before a run of more than a million tets the logger ``"stretchmap"`` says (level INFO) how much
-    memory to expect: about 600 bytes per tet for ``"vsem"``, 1300 for ``"certified"``.
+    memory to expect: about 320 bytes per tet for ``"vsem"``, 900 for ``"certified"``.
 
     Examples
     --------
