@@ -103,16 +103,16 @@ class _BoundaryMaps:
         self.equal = equal_areas(surface, self.conformal, progress)
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
-        self.is_unfolded = False
+        self.got_stuck = False
 
     def gliding(self) -> Iterator[Callable[[], AreaMap | None]]:
         """What makes them one after the other, for a boundary that will move."""
         yield self.unfolded
         if self.ratio == "search":
-            # Kept shapes are cheaper to make, and to compare with what was unfolded; where nothing
-            # was, equal areas lead further if they serve.
+            # Kept shapes are cheaper to make, and to compare with what was unfolded; where that
+            # got stuck, equal areas lead further if they serve.
             makers = self.gentle_on_fatter, self.fatter
-            yield from makers if self.is_unfolded else makers[::-1]
+            yield from makers[::-1] if self.got_stuck else makers
         yield lambda: self.gentle(self.ratio)
         yield self.folded
         yield lambda: self.after(_STEPS)
@@ -140,8 +140,8 @@ class _BoundaryMaps:
         # Faces that look inward cost the interior more steps than unfolding them beforehand; but
         # where that gets stuck, it leaves needles that no gliding opens again.
         found = self._turned(self.first)
-        self.is_unfolded = found is not None and not self._not_outward(found)
-        return found if self.is_unfolded else None
+        self.got_stuck = found is not None and self._not_outward(found) > 0
+        return None if self.got_stuck else found
 
     def folded(self) -> AreaMap | None:
         return None if self.first.certificate.certified else self.first
@@ -155,6 +155,7 @@ class _BoundaryMaps:
     def gentle(self, ratio: Ratio | float, *less_fat: float) -> AreaMap | None:
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
+        proven = None
         for at in (ratio, *less_fat):
             found = self._chart(at, _GENTLE)
             if np.abs(found.distortion.ratios).min() < _LOST:
@@ -162,7 +163,8 @@ class _BoundaryMaps:
             kept = turned(found, self.progress)
             if not self._not_outward(kept):
                 return kept
-        return None
+            proven = proven or (kept if kept.certificate.certified else None)
+        return proven
 
     def gentle_finished(self) -> AreaMap | None:
         found = self.gentle(self.ratio)

@@ -40,6 +40,9 @@ _ROUNDS = 12
 _RINGS = (2, 4)  # reach of the patches, to begin with and where that does not help
 # Inverted tets: with a larger share of all, it is not a matter of single places.
 _MOST_STUCK = 0.05
+_FEW_STUCK = 30  # worth more vertices round them before anything else
+_GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
+_NEARLY = 0.7  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
 
@@ -161,7 +164,7 @@ def _freed(run: _Run) -> bool:
 def _untangle(run: _Run, *, glide: bool) -> int:
     """Inverted tets, and tets at folded faces, that are left."""
     history = run.history
-    stuck, opened = _untangle_inside(run), None
+    stuck, opened = _untangle_inside(run, glide=glide), None
     if glide and not len(stuck):
         # A few folded faces are a matter of what is round them; for their sake all the rest would
         # be turned over once more.
@@ -196,7 +199,9 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     if run.x is opened:
         return 0
     # Away from folding: the nearer to it, the shorter are all steps that follow.
+    whole, history.budget = history.budget, history.budget.share(_GETTING_AWAY)
     away = untangle_whole(history.model, run.x, history, glide=glide)
+    history.budget = whole
     if not away.left and not len(stuck_tets(history.model, away.x, glide=glide)):
         run.x = away.x
     return 0
@@ -206,14 +211,19 @@ def _inverted(run: _Run) -> int:
     return len(stuck_tets(run.history.model, run.x, glide=False))
 
 
-def _untangle_inside(run: _Run) -> NDArray[np.intp]:
+def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     """All tets, then patches, and where that does not do, both more thoroughly; tets left.
 
-    A boundary that is going to glide on a mesh gives way before that.
+    A boundary that is going to glide on a mesh gives way before that. On a torus all of it would
+    have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
     history = run.history
     run.x = untangle_whole(history.model, run.x, history, glide=False).x
     stuck = _patched(run, glide=False)
+    if glide and 0 < len(stuck) <= _FEW_STUCK:
+        more = run.budget.share(_NEARLY)
+        history.budget = more if more.left > history.budget.left else history.budget
+        stuck = _untangled_halved(run, stuck)
     if not len(stuck):
         return stuck
     if run.on_mesh and _freed(run):
@@ -224,7 +234,23 @@ def _untangle_inside(run: _Run) -> NDArray[np.intp]:
     if len(left) > len(stuck):
         run.take(before)
         return stuck
-    return left
+    return _untangled_halved(run, left) if glide and len(left) else left
+
+
+def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Few stuck tets untangled with the edges round them halved, or left as they are."""
+    before, left = run.problem, stuck
+    for _ in range(_ROUNDS):
+        if before.refinement is None or not 0 < len(left) <= _FEW_STUCK:
+            break
+        if run.history.budget.spent:
+            break
+        run.take(run.problem.halved(crowded_edges(run.problem.solid, left)))
+        left = _patched(run, glide=False)
+    if not len(left):
+        return left
+    run.take(before)
+    return stuck
 
 
 def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:

@@ -34,6 +34,7 @@ _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done
 # not hurried: single ones stay folded then.
 _SLOW, _SWIFT, _DRAGS = 0.9, 0.7, 2
 _BETTER = 1.05
+_AWAY = 6  # steps where nothing was inverted to begin with
 _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to the floor
 _FEW, _FEW_SHARE = 30, 0.002  # inverted elements that are better worked on in patches
 _FEW_PATIENCE = 4
@@ -93,8 +94,9 @@ def _continue(
     """Follow the worst determinant down with epsilon; ``enough(left, since)`` ends it."""
     state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
     left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
-    # A better worst tet is not worth turning others over for long.
+    # A better worst tet is not worth turning others over for long, nor many steps.
     clean = left == 0
+    steps = min(steps, _AWAY) if clean else steps
     epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), _WIDEST)
     patience = Patience(left, worst)
     best = Untangled(x, left, worst)

@@ -205,7 +205,7 @@ def test_folded_faces_are_better_than_inverted_tets(problem, monkeypatch):
     run = engine._Run(problem, VolumeOptions(), history, budget)
     n, held = problem.solid.n_vertices, []
     halved = lambda run: run.problem.solid.n_vertices > n  # noqa: E731
-    monkeypatch.setattr(engine, "_untangle_inside", lambda run: np.arange(3))
+    monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(3))
     monkeypatch.setattr(
         engine, "_patched", lambda run, glide: np.arange(5) if halved(run) else np.arange(3)
     )

@@ -167,8 +167,13 @@ def charts(least: float = 1.0, outward: float = 0.0):
 
     def made(_, ratio, shape=0.0):
         kept = SimpleNamespace(ratios=np.array([1.0, least]))
+        proven = SimpleNamespace(certified=2.0 < ratio < 3.0)
         return SimpleNamespace(
-            ratio=ratio, shape=shape, distortion=kept, folded=int(ratio < outward)
+            ratio=ratio,
+            shape=shape,
+            distortion=kept,
+            certificate=proven,
+            folded=int(ratio < outward),
         )
 
     return made
@@ -184,7 +189,7 @@ def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch):
     assert maps.gentle(2.0).shape == 10.0
 
 
-@pytest.mark.parametrize(("outward", "ratio"), [(1.0, 1.5), (3.0, 3.75), (9.0, None)])
+@pytest.mark.parametrize(("outward", "ratio"), [(1.0, 1.5), (3.0, 3.75), (9.0, 2.4)])
 def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch, outward, ratio):
     turned = []
     maps = boundary_starts_module._BoundaryMaps
@@ -194,7 +199,7 @@ def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch, outwar
     monkeypatch.setattr(maps, "_chart", charts(outward=outward))
     monkeypatch.setattr(maps, "_not_outward", lambda _, found: found.folded)
     found = made.gentle_on_fatter()
-    assert (found and found.ratio) == ratio
+    assert found.ratio == pytest.approx(ratio)  # the last is proven, though folded
     assert [one.ratio for one in turned] == pytest.approx([1.5, 2.4, 3.75][: len(turned)])
     assert len(turned) == (1 if ratio == 1.5 else 3)
 
@@ -213,15 +218,20 @@ def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
     assert [chart.torus.ratio for chart in charts] == pytest.approx([2.0, 3.0] * 2)
 
 
-@pytest.mark.parametrize("folded", [True, False])
-def test_kept_shapes_come_before_equal_areas_where_faces_were_turned(monkeypatch, folded):
+@pytest.mark.parametrize(
+    ("folded", "skipped", "first"),
+    [(0.0, False, "gentle"), (0.02, True, "equal"), (0.1, True, "gentle")],
+)
+def test_equal_areas_come_before_kept_shapes_only_where_turning_just_failed(
+    monkeypatch, folded, skipped, first
+):
     maps = boundary_starts_module._BoundaryMaps(SOLID.surface, VolumeOptions(), None)
-    monkeypatch.setattr(maps, "_not_outward", lambda _: int(folded))
+    monkeypatch.setattr(maps, "_not_outward", lambda _: int(folded * SOLID.surface.n_faces))
     monkeypatch.setattr(boundary_starts_module, "turned", lambda found, _: found)
     makers = maps.gliding()
-    assert (next(makers)() is None) == folded
+    assert (next(makers)() is None) == skipped
     order = [next(makers), next(makers)]
-    assert order == [maps.fatter, maps.gentle_on_fatter][:: 1 if folded else -1]
+    assert order == [maps.gentle_on_fatter, maps.fatter][:: 1 if first == "gentle" else -1]
 
 
 @pytest.mark.parametrize("size", [(7, 1, 7), (9, 1, 9), (8, 2, 9)])

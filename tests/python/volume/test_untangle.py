@@ -14,7 +14,7 @@ from stretchmap.volume.model import History
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import VolumeProblem
 from stretchmap.volume.start import started
-from stretchmap.volume.untangle import Untangled, _continue
+from stretchmap.volume.untangle import Untangled, _continue, untangle_whole
 
 
 class Dragging:
@@ -96,8 +96,56 @@ def test_few_folded_faces_are_unfolded_with_what_is_round_them(monkeypatch, fold
         done.append("whole")
         return Untangled(x, 0, 1.0)
 
-    monkeypatch.setattr(engine, "_untangle_inside", lambda run: np.arange(0))
+    monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(0))
     monkeypatch.setattr(engine, "_patched", patched)
     monkeypatch.setattr(engine, "untangle_whole", whole)
     assert engine._untangle(run, glide=True) == 0
     assert done == (["patches", "whole", "patches"] if folded else ["patches", "whole"])
+
+
+def run_of(solid: sm.TetMesh, seconds: float = 60.0, patience: float = 1.0) -> engine._Run:
+    plain = sm.area_map(solid.surface, finish="none")
+    problem = started(VolumeProblem.of(solid, plain.image, torus=plain.torus), solver="auto")
+    budget = Budget(seconds)
+    history = History(problem.model(VolumeOptions()), budget.share(patience))
+    return engine._Run(problem, VolumeOptions(), history, budget)
+
+
+@pytest.mark.parametrize(("stuck", "cured"), [(3, True), (3, False), (300, False)])
+def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuck, cured):
+    run = run_of(sm.samples.bumpy_torus(600), patience=0.1)
+    begun, done = run.problem.solid, []
+    inner = np.setdiff1d(np.arange(begun.n_vertices), begun.boundary_vertices)
+    ends = begun.T[(begun.T == inner[0]).any(axis=1)][0]
+    edge = np.sort([inner[0], ends[ends != inner[0]][0]]).astype(np.int32)
+    monkeypatch.setattr(engine, "crowded_edges", lambda *_: edge[None])
+
+    def halved():
+        return run.problem.solid.n_vertices > begun.n_vertices
+
+    def patched(run, *, glide):
+        return np.arange(0 if cured and halved() else stuck)
+
+    def whole(model, x, history, *, glide, thorough=False):
+        done.append("thorough" if thorough else "whole")
+        return Untangled(x, stuck, -1.0)
+
+    monkeypatch.setattr(engine, "_patched", patched)
+    monkeypatch.setattr(engine, "untangle_whole", whole)
+    left = engine._untangle_inside(run, glide=True)
+    assert len(left) == (0 if cured else stuck)
+    assert done == (["whole"] if cured else ["whole", "thorough"])
+    assert halved() == cured
+    assert (run.history.budget.left > 0.5 * run.budget.seconds) == (stuck == 3)  # almost there
+
+
+def test_a_better_worst_tet_is_worth_a_few_steps(monkeypatch):
+    run = run_of(sm.samples.bumpy_torus(600))
+    options = VolumeOptions(floor=0.9)
+    model, history = run.problem.model(options), run.history
+    clean = untangle_whole(model, run.x, history, glide=True)
+    assert clean.left == 0
+    history.records.clear()
+    again = untangle_whole(model, clean.x, history, glide=True)
+    assert again.left == 0 and again.worst >= clean.worst
+    assert 0 < len(history.records) <= 6
