@@ -104,6 +104,7 @@ class _BoundaryMaps:
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
         self.got_stuck = False
+        self.tori = iter([self.fatter_ratio * more for more in (1.0, *_LESS_FAT)])
 
     def gliding(self) -> Iterator[Callable[[], AreaMap | None]]:
         """What makes them one after the other, for a boundary that will move."""
@@ -113,7 +114,9 @@ class _BoundaryMaps:
             # got stuck, equal areas lead further if they serve.
             makers = self.gentle_on_fatter, self.fatter
             yield from makers[::-1] if self.got_stuck else makers
-        yield lambda: self.gentle(self.ratio)
+            # Both sides of a thin wall can get stuck in each other on one torus, not on the next.
+            yield self.gentle_on_fatter
+        yield lambda: self.gentle([self.ratio])
         yield self.folded
         yield lambda: self.after(_STEPS)
 
@@ -150,14 +153,16 @@ class _BoundaryMaps:
         return self._unfolded(self.fatter_ratio)
 
     def gentle_on_fatter(self) -> AreaMap | None:
-        return self.gentle(self.fatter_ratio, *(more * self.fatter_ratio for more in _LESS_FAT))
+        """Another one each time, on less and less fat tori."""
+        return self.gentle(self.tori)
 
-    def gentle(self, ratio: Ratio | float, *less_fat: float) -> AreaMap | None:
+    def gentle(self, ratios: Iterable[Ratio | float]) -> AreaMap | None:
+        """With shapes kept, on the first of some tori where every face looks outward."""
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
         proven = None
-        for at in (ratio, *less_fat):
-            found = self._chart(at, _GENTLE)
+        for ratio in ratios:
+            found = self._chart(ratio, _GENTLE)
             if np.abs(found.distortion.ratios).min() < _LOST:
                 return self._unfolded(ratio, _LIGHTER)
             kept = turned(found, self.progress)
@@ -167,7 +172,7 @@ class _BoundaryMaps:
         return proven
 
     def gentle_finished(self) -> AreaMap | None:
-        found = self.gentle(self.ratio)
+        found = self.gentle([self.ratio])
         return found and finished(found, max_iter=_STEPS, tol=_TOL, progress=self.progress)
 
     def _unfolded(self, ratio: float | Ratio, shape: float = 0.0) -> AreaMap | None:

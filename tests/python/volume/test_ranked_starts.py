@@ -184,9 +184,9 @@ def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch):
     monkeypatch.setattr(boundary_starts_module, "turned", lambda found, _: found)
     monkeypatch.setattr(type(maps), "_not_outward", lambda _, found: found.folded)
     monkeypatch.setattr(type(maps), "_chart", charts(1e-3))
-    assert maps.gentle(2.0).shape == 100.0
+    assert maps.gentle([2.0]).shape == 100.0
     monkeypatch.setattr(type(maps), "_chart", charts(1e-20))
-    assert maps.gentle(2.0).shape == 10.0
+    assert maps.gentle([2.0]).shape == 10.0
 
 
 @pytest.mark.parametrize(("outward", "ratio"), [(1.0, 1.5), (3.0, 3.75), (9.0, 2.4)])
@@ -202,6 +202,8 @@ def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch, outwar
     assert found.ratio == pytest.approx(ratio)  # the last is proven, though folded
     assert [one.ratio for one in turned] == pytest.approx([1.5, 2.4, 3.75][: len(turned)])
     assert len(turned) == (1 if ratio == 1.5 else 3)
+    again = made.gentle_on_fatter()
+    assert (again and again.ratio) == (pytest.approx(2.4) if ratio == 1.5 else None)
 
 
 def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
