@@ -81,6 +81,9 @@ FacetGroups group(const Elements& elements, const int (&facet)[F][N], const Inci
     for (const Index corner : corners[vertex]) {
       const Index e = corner / width, k = corner % width;
       if (!skip.empty() && skip[e]) continue;
+      Index lower = 0;  // corners, which a facet from here has to leave out
+      for (Index i = 0; i < width; ++i) lower += elements(e, i) < vertex;
+      if (lower > width - N) continue;
       for (int j = 0; j < F; ++j) {
         std::array<Index, N> ids;
         int least = 0;
