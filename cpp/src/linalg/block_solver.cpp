@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "linalg/iterative.hpp"
+#include "linalg/ordering.hpp"
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/parallel.hpp"
 
@@ -98,10 +99,13 @@ BlockSolver::BlockSolver(BlockMatrix A, const RowsRef& modes_given, const BlockO
   s.A = std::move(A);
   std::vector<double> modes;
   if (options.preconditioner == "multigrid") modes = masked_modes(s.A, near_nullspace);
+  const Index n = s.A.rows(), *start = s.A.row_ptr.data(), *col = s.A.col.data();
+  std::vector<Index> order;
+  if (!options.ordered) order = breadth_first_order(n, start, col);
   if (near_nullspace.cols() == 3 || modes.empty())
-    s.small.emplace(s.A.rows(), s.A.row_ptr.data(), s.A.col.data(), std::move(modes));
+    s.small.emplace(n, start, col, std::move(modes), std::move(order));
   else
-    s.large.emplace(s.A.rows(), s.A.row_ptr.data(), s.A.col.data(), std::move(modes));
+    s.large.emplace(n, start, col, std::move(modes), std::move(order));
   refactor();
 }
 

@@ -3,17 +3,19 @@
 #include <cmath>
 #include <utility>
 
-#include "linalg/ordering.hpp"
-
 namespace stretchmap::linalg {
 
 using std::size_t;
 
 template <int B, int M>
 IterativeSolver<B, M>::IterativeSolver(Index n, const Index* start, const Index* col,
-                                       std::vector<double> modes)
-    : matrix_{n, start, col}, order_(breadth_first_order(n, start, col)) {
+                                       std::vector<double> modes, std::vector<Index> order)
+    : matrix_{n, start, col}, order_(std::move(order)) {
   multigrid_.finest().set_pattern(n, start, col, order_);
+  if (order_.empty()) {
+    modes_ = std::move(modes);
+    return;
+  }
   constexpr size_t kWidth = static_cast<size_t>(B) * M;
   modes_.resize(modes.size());
   for (size_t i = 0; kWidth * i < modes.size(); ++i)
@@ -40,7 +42,7 @@ std::vector<Index> IterativeSolver<B, M>::refactor(const double* values, bool ke
   if (kept_) return {};
   set_scale();
   std::vector<Index> bad = multigrid_.finest().set_values(values, matrix_.scale);
-  for (Index& row : bad) row = order_[row];
+  for (Index& row : bad) row = order_.empty() ? row : order_[row];
   if (!bad.empty() || modes_.empty()) return bad;
   if (ready_ && !watch_.worn()) {
     multigrid_.refresh();
@@ -54,7 +56,17 @@ std::vector<Index> IterativeSolver<B, M>::refactor(const double* values, bool ke
 
 template <int B, int M>
 template <int K>
+void IterativeSolver<B, M>::precondition_in_order(const float* r, float* z) {
+  if (modes_.empty())
+    multigrid_.finest().template divide_by_diagonal<K>(r, z);
+  else
+    multigrid_.template precondition<K>(r, z);
+}
+
+template <int B, int M>
+template <int K>
 void IterativeSolver<B, M>::precondition(const float* r, float* z) {
+  if (order_.empty()) return precondition_in_order<K>(r, z);
   constexpr size_t kRow = static_cast<size_t>(B) * K;
   renumbered_r_.resize(kRow * matrix_.n);
   renumbered_z_.resize(kRow * matrix_.n);
@@ -62,10 +74,7 @@ void IterativeSolver<B, M>::precondition(const float* r, float* z) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i)
       std::copy_n(r + kRow * order_[i], kRow, renumbered_r_.data() + kRow * i);
   });
-  if (modes_.empty())
-    multigrid_.finest().template divide_by_diagonal<K>(renumbered_r_.data(), renumbered_z_.data());
-  else
-    multigrid_.template precondition<K>(renumbered_r_.data(), renumbered_z_.data());
+  precondition_in_order<K>(renumbered_r_.data(), renumbered_z_.data());
   for_chunks(matrix_.n, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i)
       std::copy_n(renumbered_z_.data() + kRow * i, kRow, z + kRow * order_[i]);

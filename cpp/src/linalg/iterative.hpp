@@ -1,5 +1,5 @@
 // Conjugate gradients on the caller's matrix, preconditioned by the diagonal blocks or by multigrid
-// of a renumbered and rescaled copy in single precision.
+// of a rescaled copy in single precision, renumbered if its order is not local.
 #pragma once
 
 #include <vector>
@@ -19,8 +19,10 @@ template <int B, int M>
 class IterativeSolver {
  public:
   // Pattern in compressed rows, with the diagonal; it has to outlive this, like the values below.
-  // modes (n B M), row-major; empty: the diagonal blocks alone precondition.
-  IterativeSolver(Index n, const Index* start, const Index* col, std::vector<double> modes);
+  // modes (n B M), row-major; empty: the diagonal blocks alone precondition. order: a numbering in
+  // which neighbors are close, order[new] = old; empty: they are.
+  IterativeSolver(Index n, const Index* start, const Index* col, std::vector<double> modes,
+                  std::vector<Index> order);
 
   // Values in the pattern's order, row-major blocks. keep: the preconditioner stays as it is.
   // Returns rows whose diagonal block is not positive definite; with any the solver is unusable.
@@ -35,10 +37,12 @@ class IterativeSolver {
   void set_scale();
   template <int K>
   void precondition(const float* r, float* z);
+  template <int K>
+  void precondition_in_order(const float* r, float* z);
   // Its scale is a power of two that brings the diagonal near one: single precision needs it, and
   // what the preconditioner promises is measured against what steps gain.
   BlockRows<B> matrix_;
-  std::vector<Index> order_;  // order_[new] = old, block rows
+  std::vector<Index> order_;  // order_[new] = old, block rows; empty: the same
   std::vector<double> modes_;
   Multigrid<B, M> multigrid_;  // with the diagonal alone only its finest level is used
   ConvergenceWatch watch_;

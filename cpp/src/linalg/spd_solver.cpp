@@ -7,6 +7,7 @@
 #include "linalg/direct/cholesky.hpp"
 #include "linalg/direct/cholmod.hpp"
 #include "linalg/iterative.hpp"
+#include "linalg/ordering.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap::linalg {
@@ -114,7 +115,8 @@ void SpdSolver::refactor(bool keep_preconditioner) {
   const std::size_t modes = s.backend == "multigrid" ? static_cast<std::size_t>(n) : 0;
   if (!s.iterative)
     s.iterative.emplace(n, s.A.outerIndexPtr(), s.A.innerIndexPtr(),
-                        std::vector<double>(modes, 1.0));
+                        std::vector<double>(modes, 1.0),
+                        breadth_first_order(n, s.A.outerIndexPtr(), s.A.innerIndexPtr()));
   const std::vector<Index> bad = s.iterative->refactor(s.A.valuePtr(), keep_preconditioner);
   if (!bad.empty()) refuse_rows(bad);
 }

@@ -81,8 +81,8 @@ bool SolidNewton::linearize(const PointsRef& x, const EnergyWeights& w) {
         BlockMatrix hessian = energy_.pattern();
         energy_.model(x, w, gradient_, &hessian);
         stiffen(hessian, shift);
-        solver_ =
-            std::make_unique<linalg::BlockSolver>(std::move(hessian), energy_.near_nullspace(x));
+        solver_ = std::make_unique<linalg::BlockSolver>(
+            std::move(hessian), energy_.near_nullspace(x), linalg::BlockOptions{"multigrid", true});
       }
       return true;
     } catch (const Error&) {

@@ -12,7 +12,8 @@ namespace stretchmap::linalg {
 // Block compressed rows. Entry e of block row i (row_ptr[i] <= e < row_ptr[i + 1]) is the 3x3 block
 // at block column col[e], row-major in values[9 e .. 9 e + 8]. Columns ascend within a row; both
 // triangles and every diagonal block are stored. A degree of freedom that does not exist (a fixed
-// vertex, the normal of a gliding one) has a row and a column of the identity.
+// vertex, the normal of a gliding one) has a row and a column of the identity. Rows that are
+// coupled should have close numbers: smoothing follows them.
 struct BlockMatrix {
   IndexVec row_ptr;  // (n + 1)
   IndexVec col;      // (n_blocks)
@@ -25,6 +26,9 @@ struct BlockOptions {
   // "multigrid"  smoothed aggregation on the near-nullspace
   // "jacobi"     inverse diagonal blocks
   std::string preconditioner = "multigrid";
+  // Rows that are coupled have close numbers: they need not be renumbered for smoothing, and all
+  // that is made of the matrix reads it in one go.
+  bool ordered = false;
 };
 
 // \return (3 n, 3) displacements that cost (next to) no energy, as columns over the 3 n unknowns:

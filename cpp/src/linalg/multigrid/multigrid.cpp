@@ -9,45 +9,39 @@ using std::size_t;
 
 constexpr Index kCoarsest = 150;  // unknowns that are inverted densely
 constexpr double kThreshold = 0.1;
+constexpr int kPowerSteps = 12;
 
 }  // namespace
 
 template <int B, int K>
-void Level<B, K>::set_transfer(bool fresh) {
-  if constexpr (B == 1) {
-    // The filtered matrix has no positive off-diagonal entry: its scaled spectrum ends below 2.
-    transfer.damping = 0.75;
-  } else {
-    // The largest eigenvalue of D^-1 A by the power method, a little enlarged.
-    const size_t size = static_cast<size_t>(B) * A.n;
-    if (fresh) {
-      probe.resize(size);
-      std::uint32_t state = 1;
-      for (float& value : probe) {
-        state = state * 1664525u + 1013904223u;
-        value = static_cast<float>(state >> 8) / (1u << 24) - 0.5f;
-      }
-    }
-    std::vector<float> image(size);
-    double eigenvalue = 1.0;
-    for (int step = 0; step < (fresh ? 12 : 3); ++step) {
-      const auto norm = [&](const std::vector<float>& v) {
-        return std::sqrt(sum_chunks<1>(static_cast<Index>(size),
-                                       [&](Index begin, Index end, std::array<double, 1>& sum) {
-                                         for (Index i = begin; i < end; ++i)
-                                           sum[0] += static_cast<double>(v[i]) * v[i];
-                                       })[0]);
-      };
-      A.scaled_multiply(probe.data(), image.data());
-      const double before = norm(probe), after = norm(image);
-      if (!(before > 0.0 && after > 0.0)) break;
-      eigenvalue = after / before;
-      const float scale = static_cast<float>(1.0 / after);
-      for (size_t i = 0; i < size; ++i) probe[i] = scale * image[i];
-    }
-    transfer.damping = 4.0 / 3.0 / std::max(1.0, 1.05 * eigenvalue);
+double Level<B, K>::damping() const {
+  // The filtered matrix has no positive off-diagonal entry: its scaled spectrum ends below 2.
+  if constexpr (B == 1) return 0.75;
+  // The largest eigenvalue of D^-1 A by the power method, a little enlarged.
+  const size_t size = static_cast<size_t>(B) * A.n;
+  std::vector<float> probe(size), image(size);
+  std::uint32_t state = 1;
+  for (float& value : probe) {
+    state = state * 1664525u + 1013904223u;
+    value = static_cast<float>(state >> 8) / (1u << 24) - 0.5f;
   }
-  transfer.set_values(A);
+  double eigenvalue = 1.0;
+  for (int step = 0; step < kPowerSteps; ++step) {
+    const auto norm = [&](const std::vector<float>& v) {
+      return std::sqrt(sum_chunks<1>(static_cast<Index>(size),
+                                     [&](Index begin, Index end, std::array<double, 1>& sum) {
+                                       for (Index i = begin; i < end; ++i)
+                                         sum[0] += static_cast<double>(v[i]) * v[i];
+                                     })[0]);
+    };
+    A.scaled_multiply(probe.data(), image.data());
+    const double before = norm(probe), after = norm(image);
+    if (!(before > 0.0 && after > 0.0)) break;
+    eigenvalue = after / before;
+    const float scale = static_cast<float>(1.0 / after);
+    for (size_t i = 0; i < size; ++i) probe[i] = scale * image[i];
+  }
+  return 4.0 / 3.0 / std::max(1.0, 1.05 * eigenvalue);
 }
 
 template <int B, int K>
@@ -56,7 +50,7 @@ void Level<B, K>::descend(const float* right_hand_side, std::vector<float>& coar
   const size_t size = static_cast<size_t>(B) * N * A.n;
   smooth.resize(size);
   work.resize(size);
-  coarse_b.resize(static_cast<size_t>(K) * N * transfer.aggregates.count);
+  coarse_b.resize(static_cast<size_t>(K) * N * transfer.coarse.rows());
   A.template sweep_forward<N>(right_hand_side, smooth.data(), work.data());
   transfer.template restrict_to<N>(work.data(), coarse_b.data());
 }
@@ -72,8 +66,8 @@ void Level<B, K>::ascend(const float* right_hand_side, const std::vector<float>&
 template <int B, int K>
 void Multigrid<B, K>::setup(const std::vector<double>& modes) {
   coarse_.clear();
-  std::vector<double> next_modes = finest_.transfer.setup(finest_.A, modes, kThreshold);
-  finest_.set_transfer(true);
+  std::vector<double> next_modes =
+      finest_.transfer.setup(finest_.A, modes, kThreshold, finest_.damping());
   std::vector<double> values = finest_.transfer.coarse_values(finest_.A);
   Index fine_rows = finest_.A.n;
   const Pattern* pattern = &finest_.transfer.coarse;
@@ -82,8 +76,7 @@ void Multigrid<B, K>::setup(const std::vector<double>& modes) {
     Level<K, K> level;
     level.A.set_pattern(fine_rows, pattern->start.data(), pattern->col.data(), {});
     level.A.set_values(values.data());
-    next_modes = level.transfer.setup(level.A, next_modes, kThreshold);
-    level.set_transfer(true);
+    next_modes = level.transfer.setup(level.A, next_modes, kThreshold, level.damping());
     values = level.transfer.coarse_values(level.A);
     coarse_.push_back(std::move(level));
     pattern = &coarse_.back().transfer.coarse;
@@ -94,11 +87,9 @@ void Multigrid<B, K>::setup(const std::vector<double>& modes) {
 
 template <int B, int K>
 void Multigrid<B, K>::refresh() {
-  finest_.set_transfer(false);
   std::vector<double> values = finest_.transfer.coarse_values(finest_.A);
   for (Level<K, K>& level : coarse_) {
     level.A.set_values(values.data());
-    level.set_transfer(false);
     values = level.transfer.coarse_values(level.A);
   }
   last_.set(last_pattern_, values, K);

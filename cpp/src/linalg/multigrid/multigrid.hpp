@@ -15,10 +15,9 @@ struct Level {
   Transfer<B, K> transfer;
   std::vector<float> b, x;          // right-hand side and correction, used below the finest level
   std::vector<float> smooth, work;  // after the first sweep; residual, then corrected
-  std::vector<float> probe;         // approximate eigenvector of D^-1 A
 
-  // Renews the transfer's numbers; `fresh`: the damping is estimated from scratch.
-  void set_transfer(bool fresh);
+  // \return what the smoothing of the prolongation is damped by.
+  double damping() const;
   template <int N>
   void descend(const float* right_hand_side, std::vector<float>& coarse_b);
   template <int N>
@@ -35,7 +34,7 @@ class Multigrid {
 
   // modes (n B K): near-nullspace in the finest matrix's numbering.
   void setup(const std::vector<double>& modes);
-  // New values on the old aggregates and patterns.
+  // New values, the old prolongations.
   void refresh();
 
   // z = M r for N interleaved columns; M symmetric positive definite up to rounding.

@@ -46,22 +46,11 @@ void multiply_add(const A* a, const B* b, double* to) {
   for (int k = 0; k < R * C; ++k) to[k] = sum[k];
 }
 
-}  // namespace
-
-template <int B, int K>
-std::vector<double> Transfer<B, K>::setup(const LevelMatrix<B>& A, const std::vector<double>& modes,
-                                          double threshold) {
-  aggregates = aggregate(A, threshold);
-  std::vector<double> coarse_modes = orthonormal(A.n, modes);
-  set_patterns(A);
-  return coarse_modes;
-}
-
 // Gram-Schmidt, twice, on the modes restricted to each aggregate; a column that the others span
-// becomes zero.
+// becomes zero. Returns the modes of the aggregates.
 template <int B, int K>
-std::vector<double> Transfer<B, K>::orthonormal(Index n, const std::vector<double>& modes) {
-  tentative = modes;
+std::vector<double> make_orthonormal(Index n, const Aggregates& aggregates,
+                                     std::vector<double>& tentative) {
   Pattern member_rows;
   member_rows.columns = aggregates.count;
   member_rows.start.assign(static_cast<size_t>(n) + 1, 0);
@@ -107,28 +96,6 @@ std::vector<double> Transfer<B, K>::orthonormal(Index n, const std::vector<doubl
   return coarse_modes;
 }
 
-template <int B, int K>
-void Transfer<B, K>::set_patterns(const LevelMatrix<B>& A) {
-  const std::vector<Index>& of = aggregates.of;
-  p = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
-    if (of[i] >= 0) row.add(of[i]);
-    for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
-      if (aggregates.strong[e] && of[A.col[e]] >= 0) row.add(of[A.col[e]]);
-  });
-  std::tie(r, r_entry) = transpose(p);
-  const auto add_row = [](const Pattern& pattern, Index i, RowSet& row) {
-    for (Index e = pattern.start[i]; e < pattern.start[i + 1]; ++e) row.add(pattern.col[e]);
-  };
-  ap = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
-    add_row(p, i, row);
-    for (Index e = A.start[i]; e < A.start[i + 1]; ++e) add_row(p, A.col[e], row);
-  });
-  coarse = build_pattern(aggregates.count, aggregates.count, [&](Index a, RowSet& row) {
-    row.add(a);
-    for (Index e = r.start[a]; e < r.start[a + 1]; ++e) add_row(ap, r.col[e], row);
-  });
-}
-
 // to = scale * inverse * sum, a B x K block; `inverse` is column-major.
 template <int B, int K>
 void scaled_product(const float* inverse, const double* sum, double scale, float* to) {
@@ -140,8 +107,53 @@ void scaled_product(const float* inverse, const double* sum, double scale, float
     }
 }
 
+}  // namespace
+
 template <int B, int K>
-void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
+std::vector<double> Transfer<B, K>::setup(const LevelMatrix<B>& A, const std::vector<double>& modes,
+                                          double threshold, double damping) {
+  const Aggregates aggregates = aggregate(A, threshold);
+  std::vector<double> tentative = modes;
+  std::vector<double> coarse_modes = make_orthonormal<B, K>(A.n, aggregates, tentative);
+  const std::vector<Index> r_entry = set_patterns(A, aggregates);
+  set_prolongation(A, aggregates, tentative, damping);
+  constexpr size_t kSize = static_cast<size_t>(B) * K;
+  r_value.resize(p_value.size());
+  for_chunks(r.rows(), kChunk / 16, [&](Index begin, Index end) {
+    for (size_t e = r.start[begin]; e < static_cast<size_t>(r.start[end]); ++e)
+      for (size_t k = 0; k < kSize; ++k) r_value[kSize * e + k] = p_value[kSize * r_entry[e] + k];
+  });
+  return coarse_modes;
+}
+
+template <int B, int K>
+std::vector<Index> Transfer<B, K>::set_patterns(const LevelMatrix<B>& A,
+                                                const Aggregates& aggregates) {
+  const std::vector<Index>& of = aggregates.of;
+  p = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
+    if (of[i] >= 0) row.add(of[i]);
+    for (Index e = A.start[i]; e < A.start[i + 1]; ++e)
+      if (aggregates.strong[e] && of[A.col[e]] >= 0) row.add(of[A.col[e]]);
+  });
+  const auto add_row = [](const Pattern& pattern, Index i, RowSet& row) {
+    for (Index e = pattern.start[i]; e < pattern.start[i + 1]; ++e) row.add(pattern.col[e]);
+  };
+  std::vector<Index> r_entry;
+  std::tie(r, r_entry) = transpose(p);
+  ap = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
+    add_row(p, i, row);
+    for (Index e = A.start[i]; e < A.start[i + 1]; ++e) add_row(p, A.col[e], row);
+  });
+  coarse = build_pattern(aggregates.count, aggregates.count, [&](Index a, RowSet& row) {
+    row.add(a);
+    for (Index e = r.start[a]; e < r.start[a + 1]; ++e) add_row(ap, r.col[e], row);
+  });
+  return r_entry;
+}
+
+template <int B, int K>
+void Transfer<B, K>::set_prolongation(const LevelMatrix<B>& A, const Aggregates& aggregates,
+                                      const std::vector<double>& tentative, double damping) {
   constexpr size_t kSize = static_cast<size_t>(B) * K;
   const std::vector<Index>& of = aggregates.of;
   p_value.resize(kSize * p.col.size() + 1);  // see add_block_products
@@ -182,11 +194,6 @@ void Transfer<B, K>::set_values(const LevelMatrix<B>& A) {
   };
   for_chunks_with(
       A.n, LevelMatrix<B>::kRows, [&] { return std::vector<Index>(aggregates.count); }, rows);
-  r_value.resize(p_value.size());
-  for_chunks(r.rows(), kChunk / 16, [&](Index begin, Index end) {
-    for (size_t e = r.start[begin]; e < static_cast<size_t>(r.start[end]); ++e)
-      for (size_t k = 0; k < kSize; ++k) r_value[kSize * e + k] = p_value[kSize * r_entry[e] + k];
-  });
 }
 
 // to[f] += a p[j, f] for the entries f of row j of P.
@@ -209,7 +216,7 @@ void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index l
   constexpr size_t kSize = static_cast<size_t>(B) * K;
   const auto at = [&](Index i) { return kSize * (ap.start[i] - ap.start[first]); };
   for_chunks_with(
-      last - first, kChunk / 8, [&] { return std::vector<Index>(aggregates.count); },
+      last - first, kChunk / 8, [&] { return std::vector<Index>(coarse.rows()); },
       [&](Index begin, Index end, std::vector<Index>& slot) {
         std::fill(product + at(first + begin), product + at(first + end), 0.0);
         for (Index i = first + begin; i < first + end; ++i) {
@@ -238,7 +245,7 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const
     const Index last = std::min(A.n, first + at_once);
     multiply_rows(A, first, last, product.get());
     for_chunks_with(
-        coarse.rows(), kChunk / 16, [&] { return std::vector<Index>(aggregates.count); },
+        coarse.rows(), kChunk / 16, [&] { return std::vector<Index>(coarse.rows()); },
         [&](Index begin, Index end, std::vector<Index>& slot) {
           for (Index a = begin; a < end; ++a) {
             Index& e = next[a];
