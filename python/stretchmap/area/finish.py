@@ -33,9 +33,9 @@ _MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings
 _FAIR = 2.0  # from this face SD on, in units of tol, the shape budget counts
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 
-UNFOLD_STEPS = 100
+_UNFOLD_STEPS = 100
 # Where faces that keep what they have could be unfolded at all, it took up to 24.
-KEEPING_STEPS = 30
+_KEEPING_STEPS = 30
 _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing any more
 _EPSILON = 0.2  # of the worst face
 _LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
@@ -58,14 +58,14 @@ def unfolded(
     newton = level.newton(angles, ratio)
     if newton.least_facing() > 0.0:
         return newton, []
-    tried = [] if keep else unfold_faces(newton, UNFOLD_STEPS, progress)
+    tried = [] if keep else unfold_faces(newton, _UNFOLD_STEPS, progress)
     if newton.least_facing() > 0.0:
         return newton, tried
     try:
         keeping = level.keeping(angles, ratio)
     except DegenerateError:  # a face whose area is lost in rounding cannot keep it
         return newton, tried
-    history = unfold_faces(keeping, KEEPING_STEPS, progress)
+    history = unfold_faces(keeping, _KEEPING_STEPS, progress)
     if keeping.least_facing() > 0.0 or keep:
         newton = level.newton(keeping.angles, ratio)
     # They compare areas with those to be kept.

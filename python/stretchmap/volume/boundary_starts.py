@@ -165,7 +165,7 @@ class _BoundaryMaps:
             found = self._chart(ratio, _GENTLE)
             if np.abs(found.distortion.ratios).min() < _LOST:
                 return self._unfolded(ratio, _LIGHTER)
-            kept = turned(found, self.progress)
+            kept = turned(found, self.progress) if self._not_outward(found) else found
             if not self._not_outward(kept):
                 return kept
             proven = proven or (kept if kept.certificate.certified else None)
@@ -180,9 +180,10 @@ class _BoundaryMaps:
 
     def _turned(self, found: AreaMap) -> AreaMap | None:
         """With its folded faces turned outward, as far as that goes; None if they are too many."""
-        if self._not_outward(found) > _TOO_MANY * len(self.surface.F):
+        folded = self._not_outward(found)
+        if folded > _TOO_MANY * len(self.surface.F):
             return None
-        return turned(found, self.progress)
+        return turned(found, self.progress) if folded else found
 
     def _not_outward(self, found: AreaMap) -> int:
         """Faces that do not look outward everywhere."""

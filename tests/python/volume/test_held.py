@@ -9,7 +9,10 @@ import pytest
 
 import stretchmap as sm
 from shapes import cubes, mug, with_branch
+from stretchmap.area import finish
+from stretchmap.area.coarse import Level
 from stretchmap.area.map import finished, turned
+from stretchmap.errors import DegenerateError
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import certified, engine
 from stretchmap.volume.boundary_starts import boundary_starts
@@ -270,6 +273,21 @@ def test_folded_faces_of_a_thin_wall_are_turned_by_keeping_all_others():
         return np.median(np.abs(np.log(np.abs(found.distortion.ratios / folded.distortion.ratios))))
 
     assert changed(done) < 0.15 and changed(done) < 0.5 * changed(equal)
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_what_equal_areas_leave_folded_keeps_its_shape_unless_it_is_lost(monkeypatch, lost):
+    def no_area(*_):
+        raise DegenerateError("a face without area")
+
+    maps = boundary_starts_module._BoundaryMaps(mug(7, 1, 6).surface, VolumeOptions(), None)
+    folded = maps._chart(maps.fatter_ratio, 100.0)
+    monkeypatch.setattr(finish, "_UNFOLD_STEPS", 0)
+    if lost:
+        monkeypatch.setattr(Level, "keeping", no_area)
+    done = finished(folded, max_iter=0, tol=0.05)
+    assert (done.history[-1].flips > 0) == lost
+    assert np.array_equal(done.angles, folded.angles) == lost
 
 
 def test_a_wall_of_one_cell_is_mapped_from_shapes_kept_though_some_faces_fold():
