@@ -7,8 +7,12 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import _core, samples
-from stretchmap.volume.equalize import gently_moved
+from stretchmap.volume.budget import Budget
+from stretchmap.volume.equalize import equalize, gently_moved
 from stretchmap.volume.marginals import Marginals
+from stretchmap.volume.model import History
+from stretchmap.volume.options import VolumeOptions
+from stretchmap.volume.problem import VolumeProblem
 
 TORUS = sm.Torus(3.0, 1.0)
 
@@ -144,3 +148,14 @@ def test_equalizing_takes_no_more_than_a_fifth_of_a_tet(solid):
     assert ratios.min() < 0.8 or ratios.max() > 1.25
     went = (kept != solid.V).any(axis=1)
     assert went.any() and not went.all() and np.array_equal(kept[went], moved[went])
+
+
+@pytest.mark.parametrize(("seconds", "taken"), [(0.0, False), (60.0, True)])
+def test_without_time_left_nothing_is_equalized(seconds, taken):
+    small = samples.solid_torus(4000, R=3.0, r=1.0)
+    problem = VolumeProblem.of(small, small.V[small.boundary_vertices], torus=TORUS)
+    model, moved = problem.model(VolumeOptions()), distorted(small, "s")
+    history = History(model, Budget(seconds))
+    found = equalize(model, moved, history, VolumeOptions(), glide=False, newton=None)
+    assert (len(history.records) > 0) == taken
+    assert np.array_equal(found, moved) != taken
