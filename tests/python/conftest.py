@@ -17,6 +17,26 @@ _ROOT = Path(__file__).resolve().parents[2]
 _MESHES = Path(os.environ.get("STRETCHMAP_MESHES", _ROOT.parent / "shared" / "meshes"))
 
 
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """All tests share up to four processors; a few named ones are there sooner without."""
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if not (whole and config.pluginmanager.hasplugin("xdist")) or hasattr(config, "workerinput"):
+        return
+    option = config.option
+    if (
+        option.numprocesses is None
+        and option.dist == "no"
+        and not (option.usepdb or option.collectonly)
+    ):
+        option.numprocesses = min(4, _processors())
+        option.dist = "worksteal"  # tests of a file stay together, and with them what they share
+
+
 def _need(path: Path) -> Path:
     if not path.exists():
         pytest.skip(f"{path} is not there; set STRETCHMAP_MESHES to the folder of test meshes")
