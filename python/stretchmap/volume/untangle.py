@@ -36,7 +36,9 @@ _SLOW, _SWIFT, _DRAGS = 0.9, 0.7, 2
 _BETTER = 1.05
 _AWAY = 6  # steps where nothing was inverted to begin with
 _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to the floor
-_FEW, _FEW_SHARE = 30, 0.002  # inverted elements that are better worked on in patches
+# Inverted elements that are better worked on in patches: among slivers a hundredth of them hold up
+# all others for as long as there is time.
+_FEW, _FEW_SHARE = 30, 0.01
 _FEW_PATIENCE = 4
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
-from stretchmap.volume import engine
+from stretchmap.volume import engine, untangle
 from stretchmap.volume.budget import Budget
+from stretchmap.volume.glide_relax import Relaxation
 from stretchmap.volume.model import History
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import VolumeProblem
@@ -148,3 +149,23 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
     assert done == (["whole"] if cured else ["whole", "thorough"])
     assert halved() == cured
     assert (run.history.budget.left > 0.5 * run.budget.seconds) == (stuck == 3)  # almost there
+
+
+@pytest.mark.parametrize("left", [30, 110, 130])
+def test_a_hundredth_of_the_tets_is_soon_left_to_patches(monkeypatch, left):
+    run = run_of(sm.samples.bumpy_torus(6000))
+    asked = []
+    monkeypatch.setattr(
+        untangle, "_continue", lambda *_, enough, **__: asked.append(enough) or None
+    )
+    untangle.untangle_whole(run.history.model, run.x, run.history, glide=False)
+    share = left / 12_000 * run.problem.solid.n_tets
+    assert asked[0](int(share), 4) == (left < 120)
+    assert not asked[0](int(share), 3)
+
+
+def test_single_elements_are_relaxed_on_a_torus():
+    run = run_of(sm.samples.bumpy_torus(600))
+    measures = np.linspace(-0.5, 0.5, 20_000)
+    near = Relaxation(run.history.model)._near_folding(measures)
+    assert np.array_equal(np.flatnonzero(near), np.arange(4))
