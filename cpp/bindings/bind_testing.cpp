@@ -49,13 +49,14 @@ void bind_forms(py::module_& m) {
 void bind_linalg(py::module_& m) {
   py::class_<linalg::BlockSolver>(m, "BlockSolver")
       .def(py::init([](const IndexVecRef& row_ptr, const IndexVecRef& col, const VecRef& values,
-                       const RowsRef& near_nullspace, const std::string& preconditioner) {
+                       const RowsRef& near_nullspace, const std::string& preconditioner,
+                       bool ordered) {
              return linalg::BlockSolver(linalg::BlockMatrix{row_ptr, col, values}, near_nullspace,
-                                        linalg::BlockOptions{preconditioner});
+                                        linalg::BlockOptions{preconditioner, ordered});
            }),
            py::arg("row_ptr").noconvert(), py::arg("col").noconvert(),
            py::arg("values").noconvert(), py::arg("near_nullspace").noconvert(),
-           py::arg("preconditioner") = "multigrid", release_gil())
+           py::arg("preconditioner") = "multigrid", py::arg("ordered") = false, release_gil())
       .def(
           "refactor",
           [](linalg::BlockSolver& self, const VecRef& values, bool keep_preconditioner) {

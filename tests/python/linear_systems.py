@@ -109,7 +109,7 @@ def assemble_blocks(local, tets, n, missing, frames=None):
     return blocks
 
 
-def block_solver(blocks, modes=None, preconditioner="multigrid"):
+def block_solver(blocks, modes=None, preconditioner="multigrid", ordered=False):
     n = blocks.shape[0] // 3
     return _core.testing.BlockSolver(
         blocks.indptr.astype(np.int32),
@@ -117,6 +117,7 @@ def block_solver(blocks, modes=None, preconditioner="multigrid"):
         blocks.data.ravel().copy(),
         np.ascontiguousarray(_core.testing.translations(n) if modes is None else modes),
         preconditioner,
+        ordered,
     )
 
 

@@ -7,6 +7,10 @@ namespace stretchmap::linalg {
 
 using std::size_t;
 
+// A relative residual that rounding in single precision is far from, even where it counts as often
+// as coarse corrections are larger than residuals.
+constexpr double kLoose = 1e-2;
+
 template <int B, int M>
 IterativeSolver<B, M>::IterativeSolver(Index n, const Index* start, const Index* col,
                                        std::vector<double> modes, std::vector<Index> order)
@@ -113,10 +117,14 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
     inner_b_[in] = f * b[out];
     inner_x_[in] = f / matrix_.scale * x[out];
   });
-  const PcgSystem<K> system{
+  PcgSystem<K> system{
       static_cast<Index>(n) * B,
       [&](const double* p, double* q) { return matrix_.template multiply<K>(p, q); },
-      [&](const float* r, float* z) { precondition<K>(r, z); }};
+      [&](const float* r, float* z) { precondition<K>(r, z); },
+      {}};
+  if constexpr (B == 3)
+    if (order_.empty() && !modes_.empty() && options.tol >= kLoose)
+      system.unbalanced = [&](const float* z, float* change) { multigrid_.unbalanced(z, change); };
   const PcgResult<K> result =
       pcg<K>(system, inner_b_.data(), inner_x_.data(), vectors_, options, poll);
   if (result.finite)

@@ -8,7 +8,7 @@ import stretchmap._core.mesh
 import typing
 __all__: list[str] = ['BlockSolver', 'best_scale', 'chart_stretch_energy', 'chart_stretch_laplacian', 'chart_stretch_product', 'equal_area_from_angle', 'form_vectors', 'glide_areas', 'glide_energy', 'linking_number', 'orient2d', 'orient3d', 'rigid_body_modes', 'surface_quality', 'surface_stretch_energy', 'surface_stretch_laplacian', 'tet_laplacian', 'tet_neighbors', 'translations', 'weighted_laplacian']
 class BlockSolver:
-    def __init__(self, row_ptr: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], col: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], near_nullspace: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], preconditioner: str = 'multigrid') -> None:
+    def __init__(self, row_ptr: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], col: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"], values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], near_nullspace: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], preconditioner: str = 'multigrid', ordered: bool = False) -> None:
         ...
     def refactor(self, values: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], keep_preconditioner: bool = False) -> None:
         ...

@@ -60,6 +60,22 @@ void turn(Index n, const Scalars<K>& beta, const float* z, double* p) {
   });
 }
 
+// p = z + beta p, q = r + change + beta q; returns p'q.
+template <int K>
+Scalars<K> turn_both(Index n, const Scalars<K>& beta, const float* z, const double* r,
+                     const float* change, double* p, double* q) {
+  return sum_chunks<K>(n, [&](Index begin, Index end, Scalars<K>& sums) {
+    for (std::size_t i = begin; i < static_cast<std::size_t>(end); ++i)
+      for (int k = 0; k < K; ++k) {
+        const double direction = z[K * i + k] + beta[k] * p[K * i + k];
+        const double product = r[K * i + k] + change[K * i + k] + beta[k] * q[K * i + k];
+        p[K * i + k] = direction;
+        q[K * i + k] = product;
+        sums[k] += direction * product;
+      }
+  });
+}
+
 template <int K>
 bool all_finite(const Scalars<K>& values) {
   for (double value : values)
@@ -121,11 +137,16 @@ struct Run {
     }
   }
 
-  // p = z + beta p, with what keeps the directions conjugate.
-  void turn_direction(const Scalars<K>& rz, const Scalars<K>& rz_old) {
+  // p = z + beta p, with what keeps the directions conjugate, and q = A p; returns p'q.
+  Scalars<K> turn_direction(const Scalars<K>& rz, const Scalars<K>& rz_old) {
     Scalars<K> beta{};
     for (int k = 0; k < K; ++k) beta[k] = rz_old[k] == 0.0 ? 0.0 : rz[k] / rz_old[k];
-    turn<K>(system.n, beta, z.data(), p.data());
+    if (!system.unbalanced) {
+      turn<K>(system.n, beta, z.data(), p.data());
+      return system.apply(p.data(), q.data());
+    }
+    system.unbalanced(z.data(), r_f.data());  // whose numbers are made anew with the next residual
+    return turn_both<K>(system.n, beta, z.data(), r.data(), r_f.data(), p.data(), q.data());
   }
 
   // Steps until the recursive residual is at the goal, the budget is spent or something breaks.
@@ -137,8 +158,7 @@ struct Run {
       system.precondition(r_f.data(), z.data());
       const Scalars<K> rz = dots<K>(n, r.data(), z.data());
       if (!(result.finite = all_finite<K>(rz))) return;
-      turn_direction(rz, rz_old);
-      const Scalars<K> pq = system.apply(p.data(), q.data());
+      const Scalars<K> pq = turn_direction(rz, rz_old);
       if (!(result.finite = all_finite<K>(pq))) return;
       Scalars<K> alpha{};
       for (int k = 0; k < K; ++k) {

@@ -17,6 +17,9 @@ struct PcgSystem {
   std::function<std::array<double, K>(const double*, double*)> apply;
   // z = M r with M symmetric positive definite. Single precision: b should be of moderate size.
   std::function<void(const float*, float*)> precondition;
+  // change = A z - r after that: less work than a product, but rounding in z counts in full. Empty:
+  // products are made.
+  std::function<void(const float* z, float* change)> unbalanced;
 };
 
 template <int K>

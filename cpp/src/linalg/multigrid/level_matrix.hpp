@@ -70,6 +70,8 @@ struct LevelMatrix {
   // x = y + M' (b - A y), one backward sweep.
   template <int K>
   void sweep_backward(const float* b, const float* y, float* x) const;
+  // change = A x - b after that sweep, of its step x - y: what it left unbalanced, half the blocks.
+  void unbalanced(const float* step, float* change) const;
   // y = D^-1 A x, one column.
   void scaled_multiply(const float* x, float* y) const;
 

@@ -115,6 +115,15 @@ void Multigrid<B, K>::precondition(const float* r, float* z) {
 }
 
 template <int B, int K>
+void Multigrid<B, K>::unbalanced(const float* z, float* change) {
+  float* step = finest_.work.data();  // before the last sweep
+  for_chunks(finest_.A.n * B, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) step[i] = z[i] - step[i];
+  });
+  finest_.A.unbalanced(step, change);
+}
+
+template <int B, int K>
 std::vector<Index> Multigrid<B, K>::level_sizes() const {
   std::vector<Index> sizes{finest_.A.n};
   for (const Level<K, K>& level : coarse_) sizes.push_back(level.A.n);

@@ -41,6 +41,9 @@ class Multigrid {
   template <int N>
   void precondition(const float* r, float* z);
 
+  // change = A z - r after that, of one column.
+  void unbalanced(const float* z, float* change);
+
   std::vector<Index> level_sizes() const;  // block rows, finest first, coarsest last
   double operator_complexity() const;      // numbers stored on all levels over the finest's
 
