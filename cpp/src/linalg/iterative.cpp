@@ -123,7 +123,7 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
       [&](const float* r, float* z) { precondition<K>(r, z); },
       {}};
   if constexpr (B == 3)
-    if (order_.empty() && !modes_.empty() && options.tol >= kLoose)
+    if (order_.empty() && !modes_.empty() && !kept_ && options.tol >= kLoose)
       system.unbalanced = [&](const float* z, float* change) { multigrid_.unbalanced(z, change); };
   const PcgResult<K> result =
       pcg<K>(system, inner_b_.data(), inner_x_.data(), vectors_, options, poll);

@@ -68,6 +68,17 @@ def test_what_sweeps_leave_unbalanced_stands_for_a_product(blocks, deformed_soli
         np.testing.assert_allclose(loose, tight, atol=1e-5 * abs(tight).max())
 
 
+def test_kept_sweeps_tell_nothing_of_new_values(deformed_solid):
+    """They leave the old equations unbalanced: products are made with the new ones."""
+    blocks, stiffer = deformed_solid(0.3)[0], deformed_solid(0.45)[0]
+    rhs = np.random.default_rng(2).standard_normal((blocks.shape[0] // 3, 3))
+    solver = block_solver(blocks, ordered=True)
+    solver.refactor(stiffer.data.ravel(), keep_preconditioner=True)
+    loose, _ = solver.solve(rhs, np.zeros_like(rhs), 0.01, 3, False)
+    tight, _ = solver.solve(rhs, np.zeros_like(rhs), 0.0099, 3, False)
+    np.testing.assert_allclose(loose, tight, atol=1e-5 * abs(tight).max())
+
+
 def test_rigid_modes_pay_where_the_boundary_glides(deformed_solid):
     """Two unknowns in a tangent frame on the surface: the modes follow the frames."""
     points, tets, inner = cube(8)
