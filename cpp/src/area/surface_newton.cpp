@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
 constexpr int kStiffSteps = 6;       // towards it at most
-constexpr double kGain = 1e-2;       // of a step after which its factor serves again
+constexpr double kGain = 3e-2;       // a step that leaves no more than this keeps its factor
 constexpr int kGlideTries = 30;
 constexpr double kHoldRotation = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
