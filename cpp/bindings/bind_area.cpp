@@ -4,6 +4,7 @@
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/chart_newton.hpp"
 #include "stretchmap/area/coarsen.hpp"
+#include "stretchmap/area/phase_energies.hpp"
 #include "stretchmap/area/surface_newton.hpp"
 #include "stretchmap/area/surface_quality.hpp"
 #include "stretchmap/area/surface_sem.hpp"
@@ -85,12 +86,7 @@ void bind_quality(py::module_& m) {
            py::arg("max_aspect") = std::numeric_limits<double>::infinity(), release_gil())
       .def_readonly("areas", &SurfaceReference::areas)
       .def_readonly("cotan", &SurfaceReference::cotan);
-  py::class_<SurfaceQuality>(m, "SurfaceQuality")
-      .def_readonly("energy", &SurfaceQuality::energy)
-      .def_readonly("face_std", &SurfaceQuality::face_std)
-      .def_readonly("angle_mean", &SurfaceQuality::angle_mean)
-      .def_readonly("angle_max", &SurfaceQuality::angle_max);
-  m.def("phase_qualities", &phase_qualities, py::arg("reference"), py::arg("faces").noconvert(),
+  m.def("phase_energies", &phase_energies, py::arg("reference"), py::arg("faces").noconvert(),
         py::arg("turns").noconvert(), py::arg("candidates").noconvert(), release_gil());
 }
 

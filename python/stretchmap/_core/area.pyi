@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.mesh
 import typing
-__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfaceQuality', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'coarsen', 'phase_qualities', 'prolong', 'turn_areas']
+__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'coarsen', 'phase_energies', 'prolong', 'turn_areas']
 class SurfaceChart:
     def __init__(self, topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]) -> None:
         ...
@@ -68,19 +68,6 @@ class SurfaceReference:
     @property
     def cotan(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         ...
-class SurfaceQuality:
-    @property
-    def angle_max(self) -> float:
-        ...
-    @property
-    def angle_mean(self) -> float:
-        ...
-    @property
-    def energy(self) -> float:
-        ...
-    @property
-    def face_std(self) -> float:
-        ...
 class NewtonStep:
     @property
     def after(self) -> float:
@@ -132,7 +119,7 @@ def angle_from_equal_area(s: typing.Annotated[numpy.typing.NDArray[numpy.float64
     ...
 def coarsen(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], chart: SurfaceChart, turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], n_faces: typing.SupportsInt | typing.SupportsIndex) -> CoarseSurface:
     ...
-def phase_qualities(reference: SurfaceReference, faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], candidates: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> list[SurfaceQuality]:
+def phase_energies(reference: SurfaceReference, faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], candidates: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...
 def prolong(coarse: CoarseSurface, chart: SurfaceChart, turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
     ...

@@ -46,7 +46,7 @@ def search_phase(
     width = np.array([0.0 if phase is not None else 1.0 / _PHASES, 0.2 * (len(ratios) > 1)])
     # Near a ratio of one the best phase is a narrow one: a ratio is judged by its own best.
     rows = np.array([(p, r) for r in ratios for p in phases])
-    energies = _energies(reference, faces, turns, rows).reshape(len(ratios), -1)
+    energies = _core.area.phase_energies(reference, faces, turns, rows).reshape(len(ratios), -1)
     order = np.argsort(energies.min(axis=1), kind="stable")
     starts = dict.fromkeys([*order[:_STARTS].tolist(), 0])
     found = []
@@ -71,19 +71,9 @@ def _refined(
         offsets = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]) * width
         ratios = 1.0 + (best[1] - 1.0) * np.exp(offsets[:, 1])
         candidates = np.unique(np.column_stack([best[0] + offsets[:, 0], ratios]), axis=0)
-        energies = _energies(reference, faces, turns, candidates)
+        energies = _core.area.phase_energies(reference, faces, turns, candidates)
         before, energy = energy, float(energies.min())
         best = candidates[int(energies.argmin())]
         if width.max() <= _FINE and before - energy <= _GAIN * energy:
             break
     return best, energy
-
-
-def _energies(
-    reference: _core.area.SurfaceReference,
-    faces: NDArray[np.int32],
-    turns: NDArray[np.float64],
-    candidates: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    qualities = _core.area.phase_qualities(reference, faces, turns, candidates)
-    return np.array([quality.energy for quality in qualities])

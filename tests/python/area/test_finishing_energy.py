@@ -220,19 +220,27 @@ def _singular_values(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
     conformal = conformal_map(bumpy)
     reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
-    candidates = np.array([[0.0, 1.5], [0.3, 2.2], [-0.45, 5.0]])
-    rated = _core.area.phase_qualities(reference, bumpy.F, conformal.turns, candidates)
-    for (phase, ratio), quality in zip(candidates, rated, strict=True):
+    # more than fit into one vector of the processor, and not a multiple
+    candidates = np.column_stack([np.linspace(-0.45, 0.6, 11), np.tile([1.5, 2.2, 5.0, 1.1], 3)[:11]])
+    rated = _core.area.phase_energies(reference, bumpy.F, conformal.turns, candidates)
+    for (phase, ratio), energy in zip(candidates, rated, strict=True):
         u, shifted = 2.0 * np.pi * (conformal.turns + np.array([0.0, phase])).T
         v = _core.area.angle_from_equal_area(shifted, 1.0 / ratio)
         image = Torus.from_ratio(ratio, area=1.0).xi(u, v)
         exact = _core.testing.surface_quality(reference, bumpy.F, image)
-        assert quality.energy == pytest.approx(exact.energy, rel=1e-4)
-        assert quality.angle_mean == pytest.approx(exact.angle_mean, rel=1e-4)
+        assert energy == pytest.approx(exact.energy, rel=1e-6)
     similar = _core.testing.surface_quality(reference, bumpy.F, 2.0 * bumpy.V)
     assert similar.energy == pytest.approx(1.0, abs=1e-12)
     assert similar.angle_max == pytest.approx(1.0, abs=1e-7)
     assert similar.face_std < 1e-12
+
+
+def test_a_candidate_with_a_flat_face_is_rated_last(bumpy: TriMesh) -> None:
+    reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
+    turns = conformal_map(bumpy).turns.copy()
+    turns[bumpy.F[0]] = turns[bumpy.F[0, 0]]
+    rated = _core.area.phase_energies(reference, bumpy.F, turns, np.array([[0.0, 2.0], [0.5, 3.0]]))
+    np.testing.assert_array_equal(rated, np.inf)
 
 
 def test_newton_refuses_a_start_with_flips(

@@ -1,5 +1,4 @@
-// What a map to the torus of revolution does to a surface, measured on the polyhedral image: the
-// cheap objective by which the poloidal phase and the ratio of the radii are chosen.
+// What a map to the torus of revolution does to a surface, measured on the polyhedral image.
 #pragma once
 
 #include "stretchmap/base/types.hpp"
@@ -32,12 +31,5 @@ struct SurfaceQuality {
 // \param image (n, 3); areas are unsigned here.
 SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef& faces,
                                const PointsRef& image);
-
-// \param turns (n, 2) u and the equal-area coordinate before the phase is added.
-// \param candidates (k, 2) phase in turns and ratio R / r.
-// \return quality of the image on the torus of each candidate, to about 1e-6.
-std::vector<SurfaceQuality> phase_qualities(const SurfaceReference& reference,
-                                            const FacesRef& faces, const Points2Ref& turns,
-                                            const Points2Ref& candidates);
 
 }  // namespace stretchmap::area
