@@ -228,3 +228,32 @@ def crowded_edges(solid: TetMesh, tets: NDArray[np.intp]) -> NDArray[np.int32]:
         return np.ascontiguousarray(solid.edges[chosen])
     own = np.sort(solid.T[tets][:, TET_EDGES].reshape(-1, 2), axis=1)
     return np.unique(own, axis=0)
+
+
+def longest_inner_edges(
+    solid: TetMesh, points: NDArray[np.float64], tets: NDArray[np.intp]
+) -> NDArray[np.int32]:
+    """The longest edge of each of some tets, of those with an end inside the solid.
+
+    Parameters
+    ----------
+    solid : TetMesh
+    points : ndarray, shape (n, 3)
+        Where its vertices are to be seen for that.
+    tets : ndarray of intp
+        One without a vertex inside has none.
+
+    Returns
+    -------
+    (e, 2) ndarray of int32
+        In lexicographic order.
+    """
+    edges = np.sort(solid.T[tets][:, TET_EDGES], axis=2)
+    ends = points[edges]
+    length = np.where(
+        (solid.boundary_index[edges] < 0).any(axis=2),
+        np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2),
+        0.0,
+    )
+    longest = edges[np.arange(len(edges)), length.argmax(axis=1)]
+    return np.unique(longest[length.max(axis=1, initial=0.0) > 0.0], axis=0)

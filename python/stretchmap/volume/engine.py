@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress
 from ..certificate.checks import certify
-from ..mesh.refinement import crowded_edges
+from ..mesh.refinement import crowded_edges, longest_inner_edges
 from .budget import Budget
 from .equalize import equalize
 from .exact_rings import make_rings_exact
 from .ground import glide_on_mesh, untangle_on_mesh
-from .minimize import minimize
+from .minimize import Minimized, minimize
 from .model import History
 from .options import FillOptions, VolumeOptions
 from .problem import Outcome, VolumeProblem
@@ -45,6 +45,11 @@ _GETTING_AWAY = 0.1  # share of the time left that a better start for all that f
 _NEARLY = 0.7  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
+
+# Mean abs(ratio - 1) from which on more vertices are worth their time, and how often; the tets they
+# are for have so many times the mean energy.
+_UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 2, 3.0
+_FINER = 0.7  # share of the time left that this may take
 
 
 @dataclass
@@ -318,6 +323,9 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
                 history.model, run.x, history, glide=True, start=first, goal=o.volume_weight,
                 free=free,
             )  # fmt: skip
+        if done.converged and o.volume_weight >= VolumeOptions.volume_weight and free == (1.0, 1.0):
+            with run.timed("finer"):
+                done = _finer(run, done)
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
             history.budget = run.budget  # proven as it is: worth all the time there is
             with run.timed("release"):
@@ -335,6 +343,39 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
         if not _keep(run, done.x, True, "the map with a held boundary is kept"):
             return False, "gliding would fold the boundary", None
     return converged, reason, newton
+
+
+def _finer(run: _Run, done: Minimized) -> Minimized:
+    """The same with more vertices in the tets that keep volumes worst, if that ends in time."""
+    o, history = run.options, run.history
+    whole, history.budget = history.budget, history.budget.share(_FINER)
+    for _ in range(_FINER_ROUNDS):
+        run.x = done.x
+        before, edges = run.problem, _uneven_edges(run.problem)
+        if before.refinement is None or not len(edges):
+            break
+        run.take(before.halved(edges))
+        more = minimize(
+            history.model, run.x, history, glide=True, start=o.volume_weight, goal=o.volume_weight
+        )
+        if not more.converged:
+            run.take(before)
+            break
+        done = more
+        _log.info("volumes are kept badly: %d edges halved", len(edges))
+    history.budget = whole
+    return done
+
+
+def _uneven_edges(problem: VolumeProblem) -> NDArray[np.int32]:
+    """The longest edges of the tets whose volume is kept worst; none if all keep it well enough."""
+    volumes = _core.mesh.tet_volumes(problem.V, problem.solid.T)
+    ratios = _core.mesh.tet_volumes(problem.x, problem.solid.T) / volumes
+    if not np.abs(ratios - 1.0).mean() > _UNEVEN:
+        return np.empty((0, 2), np.int32)
+    energy = 0.5 * (ratios + 1.0 / ratios) - 1.0
+    poor = (energy > _POOR * np.average(energy, weights=volumes)) & (volumes > volumes.mean())
+    return longest_inner_edges(problem.solid, problem.V, np.flatnonzero(poor))
 
 
 def _glided_on_mesh(run: _Run) -> Outcome:

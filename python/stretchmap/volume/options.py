@@ -39,7 +39,9 @@ class FillOptions:
     ----------
     refine : bool
         Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
-        can repair, and edges round tets that stay inverted. False: such a mesh is refused.
+        can repair, and edges round tets that stay inverted; on a torus, where the mean of
+        abs(ratio - 1) is above 0.05, also edges of the tets that keep their volume worst. False: a
+        mesh of the first kind is refused, and no other gets vertices.
     time_limit : float
         Processor time per tet, in seconds, after which no further stage is begun and a map with
         inverted tets is given up; a small mesh gets some seconds all the same.

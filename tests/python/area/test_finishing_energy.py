@@ -221,7 +221,9 @@ def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
     conformal = conformal_map(bumpy)
     reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
     # more than fit into one vector of the processor, and not a multiple
-    candidates = np.column_stack([np.linspace(-0.45, 0.6, 11), np.tile([1.5, 2.2, 5.0, 1.1], 3)[:11]])
+    candidates = np.column_stack(
+        [np.linspace(-0.45, 0.6, 11), np.tile([1.5, 2.2, 5.0, 1.1], 3)[:11]]
+    )
     rated = _core.area.phase_energies(reference, bumpy.F, conformal.turns, candidates)
     for (phase, ratio), energy in zip(candidates, rated, strict=True):
         u, shifted = 2.0 * np.pi * (conformal.turns + np.array([0.0, phase])).T

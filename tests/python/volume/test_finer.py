@@ -1,0 +1,103 @@
+"""Vertices for the tets that keep their volume worst, where volumes are kept badly."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap import _core
+from stretchmap.mesh.refinement import longest_inner_edges, refine_overconstrained
+from stretchmap.samples.solids import cut_cells
+from stretchmap.volume import engine
+
+
+def plate(*shape: int) -> sm.TetMesh:
+    """Cells with a hole near one corner: the others are far from it."""
+    cells = np.ones(shape, bool)
+    cells[1, 1] = False
+    return sm.TetMesh(*cut_cells(cells), orient=True)
+
+
+@pytest.fixture(scope="module")
+def solid() -> sm.TetMesh:
+    return plate(8, 8, 2)
+
+
+@pytest.fixture(scope="module")
+def finer(solid):
+    return sm.volume_map(solid)
+
+
+def unevenness(result: sm.VolumeMap, solid: sm.TetMesh) -> float:
+    """Mean abs(ratio - 1) of the input's tets."""
+    volumes = _core.mesh.tet_volumes(result.image, result.mesh.T)
+    ratios = np.bincount(result.refinement.parent_tet, volumes) / solid.tet_volumes
+    return float(np.abs(ratios / (volumes.sum() / solid.volume) - 1.0).mean())
+
+
+def test_tets_that_keep_volumes_badly_get_vertices(solid, finer, monkeypatch):
+    monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
+    coarse = sm.volume_map(solid)
+    assert not coarse.refinement.halved and finer.refinement.halved
+    assert coarse.converged and finer.converged and finer.certificate.certified
+    assert unevenness(finer, solid) < 0.9 * unevenness(coarse, solid)
+    mean = [np.abs(one.distortion.ratios - 1.0).mean() for one in (coarse, finer)]
+    assert mean[0] > engine._UNEVEN and mean[1] < 0.95 * mean[0]
+    assert finer.mesh.n_tets < 1.25 * coarse.mesh.n_tets
+    np.testing.assert_array_equal(finer.mesh.V[: solid.n_vertices], solid.V)
+    np.testing.assert_array_equal(finer.mesh.boundary_vertices, solid.boundary_vertices)
+
+
+def test_what_keeps_volumes_well_is_left_as_it_is(solid, monkeypatch):
+    monkeypatch.setattr(engine, "_UNEVEN", 0.2)
+    assert not sm.volume_map(solid).refinement.halved
+
+
+def test_no_vertices_where_they_are_not_allowed(solid):
+    whole = refine_overconstrained(solid).solid
+    result = sm.volume_map(whole, options=sm.VolumeOptions(refine=False))
+    assert result.mesh is whole or result.mesh.n_tets == whole.n_tets
+    assert np.abs(result.distortion.ratios - 1.0).mean() > engine._UNEVEN
+
+
+@pytest.mark.parametrize("served", [0, 1])
+def test_a_round_that_does_not_end_in_time_is_taken_back(solid, finer, monkeypatch, served):
+    minimize, rounds = engine.minimize, []
+
+    def cut_off(model, x, history, *, glide, start, goal, **keywords):
+        done = minimize(model, x, history, glide=glide, start=start, goal=goal, **keywords)
+        if not glide or start < goal:
+            rounds.clear()
+            return done
+        rounds.append(done)
+        return dataclasses.replace(done, converged=len(rounds) <= served)
+
+    monkeypatch.setattr(engine, "minimize", cut_off)
+    result = sm.volume_map(solid)
+    assert result.converged and result.certificate.certified
+    assert [len(edges) for edges in result.refinement.halved] == [
+        len(edges) for edges in finer.refinement.halved[:served]
+    ]
+    assert len(rounds) == served + 1
+
+
+def test_the_longest_edges_that_reach_inside(solid):
+    whole = refine_overconstrained(solid).solid
+    tets = np.arange(0, whole.n_tets, 7)
+    inside = whole.boundary_index < 0
+    wanted = set()
+    for corners in whole.T[tets]:
+        pairs = [(a, b) for a in corners for b in corners if a < b and (inside[a] or inside[b])]
+        lengths = [np.linalg.norm(whole.V[a] - whole.V[b]) for a, b in pairs]
+        if pairs:
+            wanted.add(max(lengths))
+    found = longest_inner_edges(whole, whole.V, tets)
+    assert found.shape[1] == 2 and (found[:, 0] < found[:, 1]).all()
+    assert (inside[found].any(axis=1)).all()
+    lengths = np.linalg.norm(whole.V[found[:, 0]] - whole.V[found[:, 1]], axis=1)
+    assert set(np.round(lengths, 12)) == set(np.round(list(wanted), 12))
+    assert len(np.unique(found, axis=0)) == len(found)
+    assert longest_inner_edges(whole, whole.V, tets[:0]).shape == (0, 2)
