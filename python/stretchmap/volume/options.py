@@ -103,7 +103,7 @@ class FillOptions:
     frozen_tol: float = 5e-4
     frozen_weight: float = 10.0
     face_weight: float = 1.0
-    glide_iter: int = 500
+    glide_iter: int = 1000
     glide_tol: float = 2e-3
     glide_std: float = 0.028
     glide_distortion: float = 0.014
