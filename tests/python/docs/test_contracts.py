@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-INCLUDE = Path(__file__).resolve().parents[3] / "cpp" / "include"
+ROOT = Path(__file__).resolve().parents[3]
+INCLUDE = ROOT / "cpp" / "include"
 TAG = re.compile(r"\\(t?param|return|throws|pre)\b")
 SCOPE = re.compile(r"\b(namespace|class|struct|enum)\b")
 ASIDE = re.compile(r"= default|\boverride\b|^\s*using\b|\balignas\b|^[^(]* = |~")
@@ -65,3 +66,16 @@ def test_most_declarations_of_the_core_state_their_contract() -> None:
     ]
     share = 1.0 - len(without) / len(rows)
     assert share >= LEAST_SHARE, f"{share:.0%} of {len(rows)}; without:\n" + "\n".join(without)
+
+
+def test_functions_cloned_for_processors_are_compiled_without_contraction_and_apart() -> None:
+    """Otherwise an installed build gives other bits than the development build, or forgets them."""
+    apart = re.search(r"set\(wide ([^)]*)\)", (ROOT / "cmake" / "core.cmake").read_text())
+    assert apart is not None
+    cloned = {
+        str(path.relative_to(ROOT).as_posix())
+        for path in (ROOT / "cpp").rglob("*.[ch]pp")
+        if "STRETCHMAP_CLONES" in path.read_text() and path.name != "clones.hpp"
+    }
+    assert cloned
+    assert cloned <= set(apart[1].split())
