@@ -123,12 +123,13 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
       [&](const float* r, float* z) { precondition<K>(r, z); },
       {}};
   if constexpr (B == 3)
-    if (order_.empty() && !modes_.empty() && !kept_ && options.tol >= kLoose)
+    if (order_.empty() && !modes_.empty() && !kept_ && !stiff_ && options.tol >= kLoose)
       system.unbalanced = [&](const float* z, float* change) { multigrid_.unbalanced(z, change); };
   const PcgResult<K> result =
       pcg<K>(system, inner_b_.data(), inner_x_.data(), vectors_, options, poll);
   if (result.finite)
     each([&](size_t in, size_t out, double f) { x[out] = matrix_.scale / f * inner_x_[in]; });
+  stiff_ = stiff_ || result.drifted;
   if (!kept_) watch_.observe(result.iterations, result.digits);
   if (result.negative_curvature || !result.finite) watch_.fail();
   return result;

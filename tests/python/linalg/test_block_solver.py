@@ -79,6 +79,29 @@ def test_kept_sweeps_tell_nothing_of_new_values(deformed_solid):
     np.testing.assert_allclose(loose, tight, atol=1e-5 * abs(tight).max())
 
 
+@pytest.mark.parametrize("stiffness", [0.0, 1e5])
+def test_stiff_springs_bring_products_back(stiffness, deformed_solid):
+    """Where rounding of what replaces them shifts the residual, as it does round slivers."""
+    blocks = deformed_solid(0.45)[0].tolil()
+    rng = np.random.default_rng(3)
+    n = blocks.shape[0] // 3
+    for i in rng.choice(n, n // 20, replace=False):
+        direction = rng.standard_normal(3)
+        spring = stiffness * (np.eye(3) + np.outer(direction, direction))
+        row = blocks[3 * i : 3 * i + 3].tocsr()
+        j = rng.choice(np.unique(row.indices // 3))
+        for a, b, sign in ((i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)):
+            blocks[3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += sign * spring
+    solver = block_solver(sp.bsr_matrix(blocks, blocksize=(3, 3)), ordered=True)
+    rhs = rng.standard_normal((n, 3))
+    _, report = solver.solve(rhs, np.zeros_like(rhs), 0.1, 500, False)
+    assert report.converged
+    loose, tight = (
+        solver.solve(rhs, np.zeros_like(rhs), tol, 3, False)[0] for tol in (0.01, 0.0099)
+    )
+    assert (loose == tight).all() == (stiffness > 0.0)
+
+
 def test_rigid_modes_pay_where_the_boundary_glides(deformed_solid):
     """Two unknowns in a tangent frame on the surface: the modes follow the frames."""
     points, tets, inner = cube(8)

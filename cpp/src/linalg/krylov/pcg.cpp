@@ -10,6 +10,9 @@
 namespace stretchmap::linalg {
 namespace {
 
+// Squares of what a residual may grow by, and of what is small against the goal.
+constexpr double kDrift = 1.2, kNear = 0.01;
+
 template <int K>
 using Scalars = std::array<double, K>;
 
@@ -99,6 +102,7 @@ struct Run {
   // shorten steps that all others wait for, and little gained tells nothing.
   Scalars<K> last{};
   PcgResult<K> result{};
+  bool products = !system.unbalanced;  // are made
 
   bool done(int k) const {
     if (!(rr[k] <= goal[k])) return false;
@@ -128,6 +132,16 @@ struct Run {
     result.finite = result.finite && all_finite<K>(rr);
   }
 
+  // The residual made anew. Where rounding in what replaces products has shifted it, they are made
+  // from here on.
+  void checked_residual() {
+    const Scalars<K> told = rr;
+    true_residual();
+    for (int k = 0; k < K && !products; ++k)
+      result.drifted = result.drifted || rr[k] > std::max(kDrift * told[k], kNear * goal[k]);
+    products = products || result.drifted;
+  }
+
   // The goals; columns without a right-hand side are zero.
   void begin(const Scalars<K>& bb, double tol) {
     for (int k = 0; k < K; ++k) {
@@ -141,7 +155,7 @@ struct Run {
   Scalars<K> turn_direction(const Scalars<K>& rz, const Scalars<K>& rz_old) {
     Scalars<K> beta{};
     for (int k = 0; k < K; ++k) beta[k] = rz_old[k] == 0.0 ? 0.0 : rz[k] / rz_old[k];
-    if (!system.unbalanced) {
+    if (products) {
       turn<K>(system.n, beta, z.data(), p.data());
       return system.apply(p.data(), q.data());
     }
@@ -205,7 +219,7 @@ PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVect
     const int before = run.result.iterations;
     run.iterate(options.max_iter, poll);
     if (!run.result.finite) break;
-    run.true_residual();
+    run.checked_residual();
     if (run.result.negative_curvature || run.result.iterations == before) break;
   }
   run.result.digits = std::numeric_limits<double>::max();

@@ -29,6 +29,7 @@ struct PcgResult {
   double digits = 0.0;               // decimal digits gained by the slowest column
   bool negative_curvature = false;   // p'Ap <= 0 was met: the iterate before it is returned
   bool finite = true;                // false: a NaN or an infinity was met
+  bool drifted = false;              // without products the residual went astray
 };
 
 // Vectors of one run, kept by the caller so that the next one finds its memory in place.
