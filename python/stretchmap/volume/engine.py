@@ -323,9 +323,6 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
                 history.model, run.x, history, glide=True, start=first, goal=o.volume_weight,
                 free=free,
             )  # fmt: skip
-        if done.converged and o.volume_weight >= VolumeOptions.volume_weight and free == (1.0, 1.0):
-            with run.timed("finer"):
-                done = _finer(run, done)
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
             history.budget = run.budget  # proven as it is: worth all the time there is
             with run.timed("release"):
@@ -337,6 +334,10 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
                         start=goal if released else o.volume_weight, goal=o.volume_weight,
                         free=free,
                     )  # fmt: skip
+        alone = o.volume_weight >= VolumeOptions.volume_weight and free == (1.0, 1.0)
+        if done.converged and alone and not len(run.problem.held):
+            with run.timed("finer"):
+                done = _finer(run, done)
         converged, reason, newton = done.converged, done.reason, done.newton
         if converged and len(run.problem.held):
             converged, reason = False, f"{len(run.problem.held)} vertices of folded faces are held"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from shapes import mug
 from stretchmap import _core
 from stretchmap.mesh.refinement import longest_inner_edges, refine_overconstrained
 from stretchmap.samples.solids import cut_cells
@@ -54,6 +55,15 @@ def test_tets_that_keep_volumes_badly_get_vertices(solid, finer, monkeypatch):
 def test_what_keeps_volumes_well_is_left_as_it_is(solid, monkeypatch):
     monkeypatch.setattr(engine, "_UNEVEN", 0.2)
     assert not sm.volume_map(solid).refinement.halved
+
+
+def test_no_vertices_where_a_held_boundary_keeps_volumes_badly():
+    solid = mug(7, 1, 7)
+    start = sm.area_map(solid.surface, ratio=1.5, keep_best=True)
+    result = sm.volume_map(solid, start=start)
+    assert "are held" in result.stop_reason
+    assert np.abs(result.distortion.ratios - 1.0).mean() > engine._UNEVEN
+    assert not result.refinement.halved
 
 
 def test_no_vertices_where_they_are_not_allowed(solid):
