@@ -1,7 +1,6 @@
 // The single-precision part of a level matrix.
 #include <Eigen/Core>
 #include <algorithm>
-#include <type_traits>
 
 #include "linalg/multigrid/level_matrix.hpp"
 #include "stretchmap/base/clones.hpp"
@@ -140,55 +139,31 @@ STRETCHMAP_INLINE void leave_unbalanced(const LevelMatrix<B>& A, Index begin, In
   }
 }
 
-}  // namespace
-
 // Blocks of three unknowns, which is where the time goes, for several generations of processors.
-template <int K>
-using Count = std::integral_constant<int, K>;
-
-template <int B, int K>
-void forward_rows(Count<K>, const LevelMatrix<B>& A, Index begin, Index end, const float* b,
-                  float* x) {
-  solve_earlier<B, K>(A, begin, end, b, x);
-}
 STRETCHMAP_CLONES
-void forward_rows(Count<1>, const LevelMatrix<3>& A, Index begin, Index end, const float* b,
-                  float* x) {
+void solve_earlier_3(const LevelMatrix<3>& A, Index begin, Index end, const float* b, float* x) {
   solve_earlier<3, 1>(A, begin, end, b, x);
 }
 
-template <int B, int K>
-void residual_rows(Count<K>, const LevelMatrix<B>& A, Index begin, Index end, const float* b,
-                   const float* x, float* r) {
-  leave_rest<B, K>(A, begin, end, b, x, r);
-}
 STRETCHMAP_CLONES
-void residual_rows(Count<1>, const LevelMatrix<3>& A, Index begin, Index end, const float* b,
-                   const float* x, float* r) {
+void leave_rest_3(const LevelMatrix<3>& A, Index begin, Index end, const float* b, const float* x,
+                  float* r) {
   leave_rest<3, 1>(A, begin, end, b, x, r);
 }
 
-template <int B, int K>
-void backward_rows(Count<K>, const LevelMatrix<B>& A, Index begin, Index end, const float* b,
-                   const float* y, float* x) {
-  solve_later<B, K>(A, begin, end, b, y, x);
-}
 STRETCHMAP_CLONES
-void backward_rows(Count<1>, const LevelMatrix<3>& A, Index begin, Index end, const float* b,
-                   const float* y, float* x) {
+void solve_later_3(const LevelMatrix<3>& A, Index begin, Index end, const float* b, const float* y,
+                   float* x) {
   solve_later<3, 1>(A, begin, end, b, y, x);
 }
 
-template <int B>
-void unbalanced_rows(const LevelMatrix<B>& A, Index begin, Index end, const float* step,
-                     float* change) {
-  leave_unbalanced<B>(A, begin, end, step, change);
-}
 STRETCHMAP_CLONES
-void unbalanced_rows(const LevelMatrix<3>& A, Index begin, Index end, const float* step,
-                     float* change) {
+void leave_unbalanced_3(const LevelMatrix<3>& A, Index begin, Index end, const float* step,
+                        float* change) {
   leave_unbalanced<3>(A, begin, end, step, change);
 }
+
+}  // namespace
 
 template <int B>
 template <int K>
@@ -206,10 +181,17 @@ template <int B>
 template <int K>
 void LevelMatrix<B>::sweep_forward(const float* b, float* x, float* r) const {
   for_tasks(chunk_count(n, chunk), [&](Index c) {
-    forward_rows(Count<K>(), *this, c * chunk, std::min(n, (c + 1) * chunk), b, x);
+    const Index begin = c * chunk, end = std::min(n, begin + chunk);
+    if constexpr (B == 3)
+      solve_earlier_3(*this, begin, end, b, x);
+    else
+      solve_earlier<B, K>(*this, begin, end, b, x);
   });
   for_chunks(n, kRows, [&](Index begin, Index end) {
-    residual_rows(Count<K>(), *this, begin, end, b, x, r);
+    if constexpr (B == 3)
+      leave_rest_3(*this, begin, end, b, x, r);
+    else
+      leave_rest<B, K>(*this, begin, end, b, x, r);
   });
 }
 
@@ -217,14 +199,22 @@ template <int B>
 template <int K>
 void LevelMatrix<B>::sweep_backward(const float* b, const float* y, float* x) const {
   for_tasks(chunk_count(n, chunk), [&](Index c) {
-    backward_rows(Count<K>(), *this, c * chunk, std::min(n, (c + 1) * chunk), b, y, x);
+    const Index begin = c * chunk, end = std::min(n, begin + chunk);
+    if constexpr (B == 3)
+      solve_later_3(*this, begin, end, b, y, x);
+    else
+      solve_later<B, K>(*this, begin, end, b, y, x);
   });
 }
 
 template <int B>
 void LevelMatrix<B>::unbalanced(const float* step, float* change) const {
-  for_chunks(n, kRows,
-             [&](Index begin, Index end) { unbalanced_rows(*this, begin, end, step, change); });
+  for_chunks(n, kRows, [&](Index begin, Index end) {
+    if constexpr (B == 3)
+      leave_unbalanced_3(*this, begin, end, step, change);
+    else
+      leave_unbalanced<B>(*this, begin, end, step, change);
+  });
 }
 
 template <int B>
