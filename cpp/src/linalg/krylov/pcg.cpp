@@ -102,7 +102,9 @@ struct Run {
   // shorten steps that all others wait for, and little gained tells nothing.
   Scalars<K> last{};
   PcgResult<K> result{};
-  bool products = !system.unbalanced;  // are made
+
+  // Whether they are made, or what replaces them does.
+  bool products() const { return !system.unbalanced || result.drifted; }
 
   bool done(int k) const {
     if (!(rr[k] <= goal[k])) return false;
@@ -137,9 +139,8 @@ struct Run {
   void checked_residual() {
     const Scalars<K> told = rr;
     true_residual();
-    for (int k = 0; k < K && !products; ++k)
-      result.drifted = result.drifted || rr[k] > std::max(kDrift * told[k], kNear * goal[k]);
-    products = products || result.drifted;
+    for (int k = 0; k < K && !products(); ++k)
+      result.drifted = rr[k] > std::max(kDrift * told[k], kNear * goal[k]);
   }
 
   // The goals; columns without a right-hand side are zero.
@@ -155,7 +156,7 @@ struct Run {
   Scalars<K> turn_direction(const Scalars<K>& rz, const Scalars<K>& rz_old) {
     Scalars<K> beta{};
     for (int k = 0; k < K; ++k) beta[k] = rz_old[k] == 0.0 ? 0.0 : rz[k] / rz_old[k];
-    if (products) {
+    if (products()) {
       turn<K>(system.n, beta, z.data(), p.data());
       return system.apply(p.data(), q.data());
     }
