@@ -1,12 +1,10 @@
 #include "stretchmap/area/phase_energies.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "stretchmap/area/chart.hpp"
@@ -95,12 +93,8 @@ void add_faces(const SurfaceReference& reference, const FacesRef& faces, const L
 Vec phase_energies(const SurfaceReference& reference, const FacesRef& faces,
                    const Points2Ref& turns, const Points2Ref& candidates) {
   const Index n = static_cast<Index>(turns.rows()), count = static_cast<Index>(candidates.rows());
-  std::map<double, std::vector<TubeTable>> by_ratio;
-  for (Index i = 0; i < count; ++i) by_ratio[candidates(i, 1)];
-  std::vector<std::pair<const double, std::vector<TubeTable>>*> tables;
-  for (auto& table : by_ratio) tables.push_back(&table);
-  for_tasks(static_cast<Index>(tables.size()),
-            [&](Index k) { tables[k]->second.emplace_back(tables[k]->first); });
+  std::map<double, TubeTable> tables;
+  for (Index i = 0; i < count; ++i) tables.try_emplace(candidates(i, 1), candidates(i, 1));
   const Eigen::ArrayXd u = kTwoPi * turns.col(0).array();
   const Eigen::ArrayXd cos_u = u.cos(), sin_u = u.sin();
   Vec energies(count);
@@ -109,7 +103,7 @@ Vec phase_energies(const SurfaceReference& reference, const FacesRef& faces,
     for (int l = 0; l < kLanes; ++l) {
       const Index c = std::min(kLanes * batch + l, count - 1);
       const double phase = candidates(c, 0), ratio = candidates(c, 1);
-      const TubeTable& table = by_ratio.at(ratio).front();
+      const TubeTable& table = tables.at(ratio);
       for (Index k = 0; k < n; ++k) {
         const Eigen::Array<double, 1, 2> tube = table.at(turns(k, 1) + phase);
         const double axis = ratio + tube.x();
