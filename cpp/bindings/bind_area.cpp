@@ -6,7 +6,7 @@
 #include "stretchmap/area/coarsen.hpp"
 #include "stretchmap/area/phase_energies.hpp"
 #include "stretchmap/area/surface_newton.hpp"
-#include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/area/surface_reference.hpp"
 #include "stretchmap/area/surface_sem.hpp"
 
 namespace stretchmap::area {

@@ -1,7 +1,7 @@
 #include "arrays.hpp"
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/surface_newton.hpp"
-#include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/area/surface_reference.hpp"
 #include "stretchmap/area/surface_stretch.hpp"
 #include "stretchmap/base/predicates.hpp"
 #include "stretchmap/forms/cotangent.hpp"
@@ -108,12 +108,7 @@ void bind_stretch(py::module_& m) {
 void bind_area(py::module_& m) {
   m.def("equal_area_from_angle", &area::equal_area_from_angle, py::arg("v"), py::arg("tube_ratio"),
         release_gil());
-  py::class_<area::SurfaceQuality>(m, "SurfaceQuality")
-      .def_readonly("energy", &area::SurfaceQuality::energy)
-      .def_readonly("face_std", &area::SurfaceQuality::face_std)
-      .def_readonly("angle_mean", &area::SurfaceQuality::angle_mean)
-      .def_readonly("angle_max", &area::SurfaceQuality::angle_max);
-  m.def("surface_quality", &area::surface_quality, py::arg("reference"),
+  m.def("mean_angle_distortion", &area::mean_angle_distortion, py::arg("reference"),
         py::arg("faces").noconvert(), py::arg("image").noconvert(), release_gil());
   m.def(
       "glide_energy",

@@ -118,7 +118,7 @@ SurfaceMeasures SurfaceNewton::measures() const {
   const double R = problem_.torus().R;
   measured.flips =
       static_cast<Index>(certificate::torus_graph(image, problem_.chart.faces, R).bad.size());
-  measured.angle_mean = surface_quality(problem_.reference, problem_.chart.faces, image).angle_mean;
+  measured.angle_mean = mean_angle_distortion(problem_.reference, problem_.chart.faces, image);
   ratio_measures(problem_.chart.faces, problem_.chart.n_vertices, source, areas, measured);
   return measured;
 }

@@ -217,6 +217,13 @@ def _singular_values(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     return np.linalg.svd(flat(q) @ np.linalg.inv(flat(p)), compute_uv=False)
 
 
+def _squared_stretches(mesh: TriMesh, image: np.ndarray) -> np.ndarray:
+    """Squares of the singular values (m, 2) of the faces' maps, areas scaled to total one."""
+    scale = mesh.area / TriMesh(image, mesh.F).area
+    pairs = zip(mesh.V[mesh.F], image[mesh.F], strict=True)
+    return np.array([scale * _singular_values(p, q) ** 2 for p, q in pairs])
+
+
 def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
     conformal = conformal_map(bumpy)
     reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
@@ -229,12 +236,22 @@ def test_candidates_are_rated_like_their_images(bumpy: TriMesh) -> None:
         u, shifted = 2.0 * np.pi * (conformal.turns + np.array([0.0, phase])).T
         v = _core.area.angle_from_equal_area(shifted, 1.0 / ratio)
         image = Torus.from_ratio(ratio, area=1.0).xi(u, v)
-        exact = _core.testing.surface_quality(reference, bumpy.F, image)
-        assert energy == pytest.approx(exact.energy, rel=1e-6)
-    similar = _core.testing.surface_quality(reference, bumpy.F, 2.0 * bumpy.V)
-    assert similar.energy == pytest.approx(1.0, abs=1e-12)
-    assert similar.angle_max == pytest.approx(1.0, abs=1e-7)
-    assert similar.face_std < 1e-12
+        squares = _squared_stretches(bumpy, image)
+        shares = bumpy.face_areas / bumpy.area
+        exact = 0.25 * (shares[:, None] * (squares + 1.0 / squares)).sum()
+        assert energy == pytest.approx(exact, rel=1e-6)
+
+
+def test_mean_angle_distortion_against_singular_values(bumpy: TriMesh) -> None:
+    reference = _core.area.SurfaceReference(bumpy.V, bumpy.F)
+    image = bumpy.V * (1.0, 2.0, 0.5) + np.sin(bumpy.V[:, ::-1])
+    s1, s2 = np.sqrt(_squared_stretches(bumpy, image)).T
+    shares = bumpy.face_areas / bumpy.area
+    found = _core.testing.mean_angle_distortion(reference, bumpy.F, image)
+    assert found == pytest.approx((shares * 0.5 * (s1 / s2 + s2 / s1)).sum(), rel=1e-12)
+    assert found > 1.1
+    similar = _core.testing.mean_angle_distortion(reference, bumpy.F, 2.0 * bumpy.V)
+    assert similar == pytest.approx(1.0, abs=1e-12)
 
 
 def test_a_candidate_with_a_flat_face_is_rated_last(bumpy: TriMesh) -> None:

@@ -12,7 +12,7 @@
 
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/chart_system.hpp"
-#include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/area/surface_reference.hpp"
 #include "stretchmap/area/surface_sem.hpp"
 #include "stretchmap/area/triangle_energy.hpp"
 #include "stretchmap/base/types.hpp"

@@ -17,7 +17,7 @@
 #pragma once
 
 #include "stretchmap/area/chart.hpp"
-#include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/area/surface_reference.hpp"
 #include "stretchmap/base/torus.hpp"
 #include "stretchmap/base/types.hpp"
 

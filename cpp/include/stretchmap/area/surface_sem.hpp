@@ -18,7 +18,7 @@ struct SurfaceMeasures {
   double ring_std = 0.0;    // standard deviation of the area ratios of vertex rings (6.3)
   double face_std = 0.0;    // and of faces
   double face_error = 0.0;  // largest |ratio - 1| of a face
-  double angle_mean = 0.0;  // as in SurfaceQuality; 0 where it is not computed
+  double angle_mean = 0.0;  // see mean_angle_distortion; 0 where it is not computed
 };
 
 struct SemStep {

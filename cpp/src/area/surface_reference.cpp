@@ -1,4 +1,4 @@
-#include "stretchmap/area/surface_quality.hpp"
+#include "stretchmap/area/surface_reference.hpp"
 
 #include <cmath>
 #include <vector>
@@ -41,8 +41,8 @@ SurfaceReference surface_reference(const PointsRef& points, const FacesRef& face
   return reference;
 }
 
-SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef& faces,
-                               const PointsRef& image) {
+double mean_angle_distortion(const SurfaceReference& reference, const FacesRef& faces,
+                             const PointsRef& image) {
   const Index m = static_cast<Index>(faces.rows());
   Vec dirichlet(m), areas(m);  // |t| (s1^2 + s2^2) and image areas
   for_rows(m, [&](Index f) {
@@ -53,17 +53,7 @@ SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef
     for (int k = 0; k < 3; ++k)
       dirichlet(f) += 0.5 * reference.cotan(f, k) * (p[(k + 2) % 3] - p[(k + 1) % 3]).squaredNorm();
   });
-  const double total = areas.sum();
-  const Eigen::ArrayXd ratio = areas.array() / (total * reference.areas.array());
-  const Eigen::ArrayXd squares = dirichlet.array() / (total * reference.areas.array());
-  const Eigen::ArrayXd angle = 0.5 * squares / ratio;
-  SurfaceQuality quality;
-  quality.energy =
-      0.25 * (reference.areas.array() * squares * (1.0 + ratio.square().inverse())).sum();
-  quality.face_std = std::sqrt((ratio - ratio.mean()).square().mean());
-  quality.angle_mean = (reference.areas.array() * angle).sum();
-  quality.angle_max = angle.maxCoeff();
-  return quality;
+  return 0.5 * (reference.areas.array() * dirichlet.array() / areas.array()).sum();
 }
 
 }  // namespace stretchmap::area

@@ -1,4 +1,4 @@
-// What a map to the torus of revolution does to a surface, measured on the polyhedral image.
+// The source as maps of a surface see it, and what they do to its angles.
 #pragma once
 
 #include "stretchmap/base/types.hpp"
@@ -20,16 +20,10 @@ struct SurfaceReference {
 SurfaceReference surface_reference(const PointsRef& points, const FacesRef& faces,
                                    double max_aspect);
 
-struct SurfaceQuality {
-  double energy = 0.0;      // mean of (s1^2 + s2^2 + s1^-2 + s2^-2) / 4 over the source's area, s
-                            // the singular values of a face's map, areas scaled to total one
-  double face_std = 0.0;    // standard deviation of the area ratios
-  double angle_mean = 0.0;  // mean of (s1 / s2 + s2 / s1) / 2 over the source's area
-  double angle_max = 0.0;
-};
-
 // \param image (n, 3); areas are unsigned here.
-SurfaceQuality surface_quality(const SurfaceReference& reference, const FacesRef& faces,
-                               const PointsRef& image);
+// \return mean of (s1 / s2 + s2 / s1) / 2 over the source's area, s the singular values of a face's
+//         map: one where all angles are kept.
+double mean_angle_distortion(const SurfaceReference& reference, const FacesRef& faces,
+                             const PointsRef& image);
 
 }  // namespace stretchmap::area
