@@ -13,6 +13,7 @@ from stretchmap import _core
 from stretchmap.mesh.refinement import longest_inner_edges, refine_overconstrained
 from stretchmap.samples.solids import cut_cells
 from stretchmap.volume import engine
+from stretchmap.volume.problem import VolumeProblem
 
 
 def plate(*shape: int) -> sm.TetMesh:
@@ -69,29 +70,60 @@ def test_no_vertices_where_a_held_boundary_keeps_volumes_badly():
 def test_no_vertices_where_they_are_not_allowed(solid):
     whole = refine_overconstrained(solid).solid
     result = sm.volume_map(whole, options=sm.VolumeOptions(refine=False))
-    assert result.mesh is whole or result.mesh.n_tets == whole.n_tets
+    assert result.mesh.n_tets == whole.n_tets
     assert np.abs(result.distortion.ratios - 1.0).mean() > engine._UNEVEN
 
 
 @pytest.mark.parametrize("served", [0, 1])
 def test_a_round_that_does_not_end_in_time_is_taken_back(solid, finer, monkeypatch, served):
-    minimize, rounds = engine.minimize, []
+    minimize, outcome, rounds, left = engine.minimize, engine._outcome, [], []
 
     def cut_off(model, x, history, *, glide, start, goal, **keywords):
         done = minimize(model, x, history, glide=glide, start=start, goal=goal, **keywords)
         if not glide or start < goal:
             rounds.clear()
             return done
-        rounds.append(done)
+        rounds.append(history.budget.seconds)
         return dataclasses.replace(done, converged=len(rounds) <= served)
 
+    def ended(run, *arguments):
+        left.append(run.history.budget.seconds)
+        return outcome(run, *arguments)
+
     monkeypatch.setattr(engine, "minimize", cut_off)
+    monkeypatch.setattr(engine, "_outcome", ended)
     result = sm.volume_map(solid)
     assert result.converged and result.certificate.certified
     assert [len(edges) for edges in result.refinement.halved] == [
         len(edges) for edges in finer.refinement.halved[:served]
     ]
     assert len(rounds) == served + 1
+    assert max(rounds) < 0.75 * left[-1]  # what follows has all of the time again
+
+
+def test_vertices_are_for_large_tets_that_keep_their_volume_worst(monkeypatch):
+    solid = sm.samples.bumpy_torus(3000)
+    torus = sm.area_map(solid.surface).torus
+    problem = VolumeProblem.of(solid, solid.V, torus=torus, warm=True)
+    assert not len(engine._uneven_edges(problem))  # all ratios are one
+    volumes, inside = solid.tet_volumes, solid.boundary_index < 0
+    moved = int(np.flatnonzero(inside)[len(solid.V) // 5])
+    at = (solid.T == moved).any(axis=1)
+    x = problem.x.copy()
+    x[moved] += 0.4 * (x[solid.T[at]].reshape(-1, 3).max(axis=0) - x[moved])
+    uneven = dataclasses.replace(problem, x=x)
+    assert not len(engine._uneven_edges(uneven))  # on the whole they are good enough
+    monkeypatch.setattr(engine, "_UNEVEN", 0.0)
+    ratios = _core.mesh.tet_volumes(x, solid.T) / _core.mesh.tet_volumes(problem.V, solid.T)
+    assert ratios.min() > 0.0 and (np.abs(ratios[at] - 1.0) > 0.05).any()
+    energy = 0.5 * (ratios + 1.0 / ratios) - 1.0
+    large = volumes > volumes.mean()
+    worst = large & (energy > 3.0 * (energy * volumes).sum() / volumes.sum())
+    assert (worst & at).any() and (large & ~worst).any() and not (worst & ~at).any()
+    found = engine._uneven_edges(uneven)
+    np.testing.assert_array_equal(
+        found, longest_inner_edges(solid, problem.V, np.flatnonzero(worst))
+    )
 
 
 def test_the_longest_edges_that_reach_inside(solid):
