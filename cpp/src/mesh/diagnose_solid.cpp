@@ -206,18 +206,18 @@ SolidDiagnosis diagnose_solid(const PointsRef& points, const TetsRef& tets, cons
   };
   const Index n_vertices = static_cast<Index>(points.rows());
   SolidDiagnosis report;
-  const Incidence<> corners = corners_at(tets, n_vertices);
-  const LeftOut out = left_out(tets, group_equal_tets(tets, corners, poll));
+  const LeftOut out = left_out(tets, group_equal_tets(tets, n_vertices, poll));
   const Mask& skip = out.either;
   report.repeated = set_entries(out.repeated);
   report.duplicates = set_entries(out.copies);
 
-  const FacetGroups faces = group_half_faces(tets, corners, skip, poll);
+  const FacetGroups faces = group_half_faces(tets, n_vertices, skip, poll);
   rest();
   orientation(points, tets, faces, skip, report);
   rest();
   boundary(points, tets, faces, report);
   const std::vector<Index> next = rings_of(faces, static_cast<Index>(4 * tets.rows()));
+  const Incidence<> corners = corners_at(tets, n_vertices);
   const Links links = LinkCheck(tets, corners, skip, next).run();
   nonmanifold_vertices(links.sound, report);
   rest();

@@ -95,8 +95,7 @@ void topology(const FacesRef& faces, const FacetGroups& groups, const Mask& skip
 SurfaceDiagnosis diagnose_surface(const PointsRef& points, const FacesRef& faces) {
   const Index n_vertices = static_cast<Index>(points.rows());
   SurfaceDiagnosis report;
-  const Incidence<> corners = corners_at(faces, n_vertices);
-  const LeftOut out = left_out(faces, group_equal_faces(faces, corners));
+  const LeftOut out = left_out(faces, group_equal_faces(faces, n_vertices));
   const Mask& skip = out.either;
   const auto flat = degenerate_faces(points, faces);
   Mask no_area(skip.size(), 0);
@@ -107,7 +106,7 @@ SurfaceDiagnosis diagnose_surface(const PointsRef& points, const FacesRef& faces
   report.duplicates = set_entries(out.copies);
   report.degenerate = set_entries(no_area);
 
-  const FacetGroups groups = group_half_edges(faces, corners, skip);
+  const FacetGroups groups = group_half_edges(faces, n_vertices, skip);
   orientation(points, faces, groups, skip, report);
   manifoldness(faces, groups, skip, n_vertices, report);
   topology(faces, groups, skip, n_vertices, report);

@@ -47,101 +47,100 @@ constexpr int kHalfEdge[3][2] = {{0, 1}, {1, 2}, {2, 0}};
 constexpr int kFace[1][3] = {{0, 1, 2}};
 constexpr int kTet[1][4] = {{0, 1, 2, 3}};
 
-// Groups found from one chunk of vertices: those of which they are the lowest.
-struct Part {
-  std::vector<Index> order, start;
-};
-
-FacetGroups joined(std::vector<Part>& parts) {
-  std::vector<std::array<std::size_t, 2>> place{{0, 0}};
-  for (const Part& part : parts)
-    place.push_back({place.back()[0] + part.order.size(), place.back()[1] + part.start.size()});
-  FacetGroups groups;
-  groups.order.resize(place.back()[0]);
-  groups.start.resize(place.back()[1] + 1);
-  for_tasks(static_cast<Index>(parts.size()), [&](Index p) {
-    const auto [order, start] = place[p];
-    std::copy(parts[p].order.begin(), parts[p].order.end(), groups.order.begin() + order);
-    std::transform(parts[p].start.begin(), parts[p].start.end(), groups.start.begin() + start,
-                   [first = order](Index at) { return at + static_cast<Index>(first); });
-    parts[p] = Part();
-  });
-  groups.start.back() = static_cast<Index>(groups.order.size());
-  return groups;
+// The ids in ascending order, without a branch that could only be guessed.
+template <std::size_t N>
+void sort_few(std::array<Index, N>& ids) {
+  for (std::size_t last = N - 1; last > 0; --last)
+    for (std::size_t i = 0; i < last; ++i) {
+      const Index a = ids[i], b = ids[i + 1];
+      ids[i] = std::min(a, b);
+      ids[i + 1] = std::max(a, b);
+    }
 }
 
-// Facet F e + j of element e has the element's corners facet[j]. A facet is found from its lowest
-// vertex; a short sort there brings equal ones together.
+// Facet F e + j of element e has the element's corners facet[j]. Facets are listed at their lowest
+// vertices; a short sort there brings equal ones together.
 template <class Elements, int F, int N>
-FacetGroups group(const Elements& elements, const int (&facet)[F][N], const Incidence<>& corners,
-                  const Mask& skip, const Poll& poll) {
-  const Index width = static_cast<Index>(elements.cols());
+FacetGroups group(const Elements& elements, const int (&facet)[F][N], Index n, const Mask& skip,
+                  const Poll& poll) {
+  const auto ids_of = [&](Index e, int j) {
+    std::array<Index, N> ids;
+    for (int i = 0; i < N; ++i) ids[i] = elements(e, facet[j][i]);
+    return ids;
+  };
+  const Index m = static_cast<Index>(elements.rows());
+  const Incidence<> facets = listed_at(n, m, [&](Index e, const auto& visit) {
+    if (!skip.empty() && skip[e]) return;
+    for (int j = 0; j < F; ++j) {
+      const std::array<Index, N> ids = ids_of(e, j);
+      Index lowest = ids[0];
+      for (int i = 1; i < N; ++i) lowest = std::min(lowest, ids[i]);
+      visit(lowest, F * e + j);
+    }
+  });
   const auto gather = [&](Index vertex, std::vector<Key<N>>& keys) {
     keys.clear();
-    for (const Index corner : corners[vertex]) {
-      const Index e = corner / width, k = corner % width;
-      if (!skip.empty() && skip[e]) continue;
-      Index lower = 0;  // corners, which a facet from here has to leave out
-      for (Index i = 0; i < width; ++i) lower += elements(e, i) < vertex;
-      if (lower > width - N) continue;
-      for (int j = 0; j < F; ++j) {
-        std::array<Index, N> ids;
-        int least = 0;
-        for (int i = 0; i < N; ++i) {
-          ids[i] = elements(e, facet[j][i]);
-          if (ids[i] < ids[least]) least = i;
-        }
-        if (facet[j][least] != k) continue;
-        std::sort(ids.begin(), ids.end());
-        keys.emplace_back(ids, F * e + j);
-      }
+    for (const Index f : facets[vertex]) {
+      std::array<Index, N> ids = ids_of(f / F, f % F);
+      sort_few(ids);
+      keys.emplace_back(ids, f);
     }
     std::sort(keys.begin(), keys.end());
   };
-  const Index n = corners.size();
-  std::vector<Part> parts(static_cast<std::size_t>(chunk_count(n, kElementChunk)));
+  FacetGroups groups;
+  const Index* const all = facets.of(0, n).begin();
+  groups.order.resize(facets.of(0, n).end() - all);
+  std::vector<std::vector<Index>> starts(static_cast<std::size_t>(chunk_count(n, kElementChunk)));
   for (Index first = 0; first < n; first += kBetweenPolls) {
     if (poll) poll();
     for_chunks_with(
         std::min(kBetweenPolls, n - first), kElementChunk, [] { return std::vector<Key<N>>(); },
         [&](Index begin, Index end, std::vector<Key<N>>& keys) {
-          Part& part = parts[(first + begin) / kElementChunk];
+          std::vector<Index>& start = starts[(first + begin) / kElementChunk];
+          const auto here = facets.of(first + begin, first + end);
+          start.reserve(here.end() - here.begin());
+          Index at = static_cast<Index>(here.begin() - all);
           for (Index i = first + begin; i < first + end; ++i) {
             gather(i, keys);
             for (std::size_t p = 0; p < keys.size(); ++p) {
-              if (p == 0 || !keys[p].same(keys[p - 1]))
-                part.start.push_back(static_cast<Index>(part.order.size()));
-              part.order.push_back(keys[p].facet);
+              if (p == 0 || !keys[p].same(keys[p - 1])) start.push_back(at);
+              groups.order[at++] = keys[p].facet;
             }
           }
         });
   }
-  return joined(parts);
+  std::size_t count = 0;
+  for (const std::vector<Index>& start : starts) count += start.size();
+  groups.start.reserve(count + 1);
+  for (const std::vector<Index>& start : starts)
+    groups.start.insert(groups.start.end(), start.begin(), start.end());
+  groups.start.push_back(static_cast<Index>(groups.order.size()));
+  return groups;
 }
 
 }  // namespace
 
-FacetGroups group_half_edges(const FacesRef& faces, const Incidence<>& corners, const Mask& skip,
+FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip,
                              const Poll& poll) {
-  return group(faces, kHalfEdge, corners, skip, poll);
+  return group(faces, kHalfEdge, n_vertices, skip, poll);
 }
 
-FacetGroups group_half_faces(const TetsRef& tets, const Incidence<>& corners, const Mask& skip,
+FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip,
                              const Poll& poll) {
-  return group(tets, kTetFace, corners, skip, poll);
+  return group(tets, kTetFace, n_vertices, skip, poll);
 }
 
-FacetGroups group_tet_edges(const TetsRef& tets, const Incidence<>& corners, const Mask& skip,
+FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip,
                             const Poll& poll) {
-  return group(tets, kTetEdge, corners, skip, poll);
+  return group(tets, kTetEdge, n_vertices, skip, poll);
 }
 
-FacetGroups group_equal_faces(const FacesRef& faces, const Incidence<>& corners) {
-  return group(faces, kFace, corners, {}, {});
+FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices) {
+  return group(faces, kFace, n_vertices, {}, {});
 }
 
-FacetGroups group_equal_tets(const TetsRef& tets, const Incidence<>& corners, const Poll& poll) {
-  return group(tets, kTet, corners, {}, poll);
+FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices, const Poll& poll) {
+  return group(tets, kTet, n_vertices, {}, poll);
 }
 
 int same_turn(const Eigen::Matrix<Index, 1, 3>& a, const Eigen::Matrix<Index, 1, 3>& b) {

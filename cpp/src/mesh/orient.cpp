@@ -135,17 +135,15 @@ Mask tets_to_turn(const PointsRef& points, const TetsRef& tets, const Patches& p
 
 IndexVec misoriented_faces(const PointsRef& points, const FacesRef& faces) {
   const Index n = static_cast<Index>(points.rows());
-  const Incidence<> corners = corners_at(faces, n);
-  const Mask skip = left_out(faces, group_equal_faces(faces, corners)).either;
-  const Patches patches = face_patches(faces, group_half_edges(faces, corners, skip), skip);
+  const Mask skip = left_out(faces, group_equal_faces(faces, n)).either;
+  const Patches patches = face_patches(faces, group_half_edges(faces, n, skip), skip);
   return set_entries(faces_to_turn(points, faces, patches));
 }
 
 IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets) {
   const Index n = static_cast<Index>(points.rows());
-  const Incidence<> corners = corners_at(tets, n);
-  const Mask skip = left_out(tets, group_equal_tets(tets, corners)).either;
-  const Patches patches = tet_patches(tets, group_half_faces(tets, corners, skip), skip);
+  const Mask skip = left_out(tets, group_equal_tets(tets, n)).either;
+  const Patches patches = tet_patches(tets, group_half_faces(tets, n, skip), skip);
   return set_entries(tets_to_turn(points, tets, patches));
 }
 

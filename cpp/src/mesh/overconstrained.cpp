@@ -74,11 +74,10 @@ Mask fewer_on(const Rim& rim, const TetsRef& tets, int least) {
   return fewer;
 }
 
-void plan_edges(const TetsRef& tets, const Incidence<>& corners, const Rim& rim, Plan& plan,
+void plan_edges(const TetsRef& tets, Index n_vertices, const Rim& rim, Plan& plan,
                 const Poll& poll) {
-  const Index n_vertices = corners.size();
   std::vector<Pair> edges;
-  const FacetGroups groups = group_tet_edges(tets, corners, fewer_on(rim, tets, 2), poll);
+  const FacetGroups groups = group_tet_edges(tets, n_vertices, fewer_on(rim, tets, 2), poll);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index h = groups.order[groups.start[g]];
     const Index a = tets(h / 6, kTetEdge[h % 6][0]), b = tets(h / 6, kTetEdge[h % 6][1]);
@@ -93,10 +92,10 @@ void plan_edges(const TetsRef& tets, const Incidence<>& corners, const Rim& rim,
 }
 
 // Added vertices are numbered from `first_vertex`.
-void plan_faces(const TetsRef& tets, const Incidence<>& corners, Index first_vertex, const Rim& rim,
+void plan_faces(const TetsRef& tets, Index n_vertices, Index first_vertex, const Rim& rim,
                 Plan& plan, const Poll& poll) {
   std::vector<Triple> faces;
-  const FacetGroups groups = group_half_faces(tets, corners, fewer_on(rim, tets, 3), poll);
+  const FacetGroups groups = group_half_faces(tets, n_vertices, fewer_on(rim, tets, 3), poll);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index first = groups.start[g];
     if (groups.start[g + 1] - first < 2) continue;
@@ -120,10 +119,9 @@ Plan plan_splits(const TetsRef& tets, Index n_vertices, const Poll& poll) {
                 {repeated.begin(), repeated.end()});
   }
   const Rim rim(tets, n_vertices, poll);
-  const Incidence<> corners = corners_at(tets, n_vertices);
   Plan plan;
-  plan_edges(tets, corners, rim, plan, poll);
-  plan_faces(tets, corners, n_vertices + static_cast<Index>(plan.found.edges.rows()), rim, plan,
+  plan_edges(tets, n_vertices, rim, plan, poll);
+  plan_faces(tets, n_vertices, n_vertices + static_cast<Index>(plan.found.edges.rows()), rim, plan,
              poll);
   std::sort(plan.splits.begin(), plan.splits.end(), [](const Split& a, const Split& b) {
     return std::pair(a.tet, a.vertex) < std::pair(b.tet, b.vertex);

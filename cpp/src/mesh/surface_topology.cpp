@@ -47,7 +47,7 @@ SurfaceTopology surface_topology(const FacesRef& faces, Index n_vertices) {
   top.n_vertices = n_vertices;
   top.faces = faces;
   const Index n_half = static_cast<Index>(3 * faces.rows());
-  const FacetGroups groups = group_half_edges(faces, corners_at(faces, n_vertices));
+  const FacetGroups groups = group_half_edges(faces, n_vertices);
 
   top.twin.setConstant(n_half, -1);
   top.edge.resize(n_half);

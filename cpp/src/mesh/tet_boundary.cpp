@@ -11,7 +11,7 @@
 namespace stretchmap::mesh {
 
 IndexVec tet_neighbors(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  const FacetGroups groups = group_half_faces(tets, corners_at(tets, n_vertices), {}, poll);
+  const FacetGroups groups = group_half_faces(tets, n_vertices, {}, poll);
   IndexVec twin(4 * tets.rows());
   for_rows(groups.size(), [&](Index g) {
     const Index* h = groups.order.data() + groups.start[g];
@@ -62,7 +62,7 @@ TetBoundary tet_boundary(const TetsRef& tets, Index n_vertices, const Poll& poll
 }
 
 Edges tet_edges(const TetsRef& tets, Index n_vertices, const Poll& poll) {
-  const FacetGroups groups = group_tet_edges(tets, corners_at(tets, n_vertices), {}, poll);
+  const FacetGroups groups = group_tet_edges(tets, n_vertices, {}, poll);
   Edges edges(groups.size(), 2);
   for (Index g = 0; g < groups.size(); ++g) {
     const Index h = groups.order[groups.start[g]];

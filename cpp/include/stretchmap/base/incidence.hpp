@@ -72,18 +72,26 @@ class Incidence {
   std::vector<Item> items_;
 };
 
+// (n) what m elements have at each of n things, in their order: each(element, visit) calls
+// visit(thing, item), the same ones both times it is called.
+template <class Each>
+Incidence<> listed_at(Index n, Index m, const Each& each) {
+  constexpr Index kLeast = 16384, kMost = 8;  // elements of a part, parts
+  const Index parts = std::clamp(chunk_count(m, kLeast), Index{1}, kMost);
+  const Index size = chunk_count(m, parts);
+  return Incidence<>(n, parts, [&](Index part, const auto& visit) {
+    for (Index e = part * size; e < std::min(m, (part + 1) * size); ++e) each(e, visit);
+  });
+}
+
 // (n) the corners at each vertex, as width * element + corner of the rows of `elements` (m, width),
 // ascending; entries for which row_of(vertex) is negative are in none.
 template <class Elements, class RowOf>
 Incidence<> corners_at(const Elements& elements, Index n, const RowOf& row_of) {
-  constexpr Index kLeast = 16384, kMost = 8;  // elements of a part, parts
   const Index m = static_cast<Index>(elements.rows()), width = static_cast<Index>(elements.cols());
-  const Index parts = std::clamp(chunk_count(m, kLeast), Index{1}, kMost);
-  const Index size = chunk_count(m, parts);
-  return Incidence<>(n, parts, [&](Index part, const auto& visit) {
-    for (Index e = part * size; e < std::min(m, (part + 1) * size); ++e)
-      for (Index k = 0; k < width; ++k)
-        if (const Index row = row_of(elements(e, k)); row >= 0) visit(row, width * e + k);
+  return listed_at(n, m, [&](Index e, const auto& visit) {
+    for (Index k = 0; k < width; ++k)
+      if (const Index row = row_of(elements(e, k)); row >= 0) visit(row, width * e + k);
   });
 }
 template <class Elements>

@@ -24,18 +24,16 @@ struct FacetGroups {
 // One entry per element; empty means that no element is skipped.
 using Mask = std::vector<char>;
 
-// \param corners corners_at of the elements, all of them.
 // \param skip elements with a set mask are left out.
-FacetGroups group_half_edges(const FacesRef& faces, const Incidence<>& corners,
-                             const Mask& skip = {}, const Poll& poll = {});
-FacetGroups group_half_faces(const TetsRef& tets, const Incidence<>& corners, const Mask& skip = {},
+FacetGroups group_half_edges(const FacesRef& faces, Index n_vertices, const Mask& skip = {},
                              const Poll& poll = {});
-FacetGroups group_tet_edges(const TetsRef& tets, const Incidence<>& corners, const Mask& skip = {},
+FacetGroups group_half_faces(const TetsRef& tets, Index n_vertices, const Mask& skip = {},
+                             const Poll& poll = {});
+FacetGroups group_tet_edges(const TetsRef& tets, Index n_vertices, const Mask& skip = {},
                             const Poll& poll = {});
 // Whole elements with the same vertex set.
-FacetGroups group_equal_faces(const FacesRef& faces, const Incidence<>& corners);
-FacetGroups group_equal_tets(const TetsRef& tets, const Incidence<>& corners,
-                             const Poll& poll = {});
+FacetGroups group_equal_faces(const FacesRef& faces, Index n_vertices);
+FacetGroups group_equal_tets(const TetsRef& tets, Index n_vertices, const Poll& poll = {});
 
 // \return vertices of half-face h, in its outward order.
 inline Eigen::Matrix<Index, 1, 3> half_face(const TetsRef& tets, Index h) {
