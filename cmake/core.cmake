@@ -51,7 +51,8 @@ set(wide cpp/src/volume/tet_weights.cpp cpp/src/volume/tet_weights_avx2.cpp
          cpp/src/volume/tet_weights_avx512.cpp cpp/src/volume/element_energy.cpp
          cpp/src/volume/line_bound.cpp cpp/src/linalg/multigrid/block_products.cpp
          cpp/src/linalg/multigrid/level_smoother.cpp
-         cpp/src/linalg/direct/dense_front.cpp cpp/src/area/phase_energies.cpp)
+         cpp/src/linalg/direct/dense_front.cpp cpp/src/area/phase_energies.cpp
+         cpp/src/area/convex_faces.cpp)
 if(NOT MSVC)
   set_source_files_properties(
     ${wide} PROPERTIES COMPILE_OPTIONS -ffp-contract=off SKIP_PRECOMPILE_HEADERS ON

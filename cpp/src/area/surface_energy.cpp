@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "area/convex_faces.hpp"
 #include "area/face_jet.hpp"
 #include "area/facing.hpp"
 #include "stretchmap/area/surface_pattern.hpp"
 #include "stretchmap/base/parallel.hpp"
-#include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::area {
 
@@ -126,14 +126,6 @@ void add_shape(const Jet& d, const Jet& a, double weight, bool second, Jet& sum)
                  (2.0 * by_a / a.value) * a.gradient * a.gradient.transpose();
 }
 
-void make_convex(SixSix& matrix) {
-  const double size = matrix.diagonal().cwiseAbs().maxCoeff();
-  const SixSix shifted = matrix + 1e-12 * size * SixSix::Identity();
-  if (linalg::is_positive_definite(shifted)) return;
-  matrix =
-      linalg::map_eigenvalues(matrix, [](double value, double) { return std::max(value, 0.0); });
-}
-
 Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                 const std::vector<TorusPoint>& points, const Points2Ref& angles, Index f,
                 Derivatives derivatives) {
@@ -185,13 +177,15 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
   Rows gradients(second ? m : 0, 6);
   GlideEnergy energy;
   if (second) energy.hessians.resize(m, 36);
-  for_rows(m, kCostlyChunk, [&](Index f) {
-    Jet jet = face_energy(problem, weights, scale, points, angles, f, derivatives);
-    values(f) = jet.value;
-    if (!second) return;
-    gradients.row(f) = jet.gradient;
-    if (derivatives == Derivatives::kModel) make_convex(jet.hessian);
-    Eigen::Map<SixSix>(energy.hessians.row(f).data()) = jet.hessian;
+  for_chunks(m, kCostlyChunk, [&](Index begin, Index end) {
+    for (Index f = begin; f < end; ++f) {
+      const Jet jet = face_energy(problem, weights, scale, points, angles, f, derivatives);
+      values(f) = jet.value;
+      if (!second) continue;
+      gradients.row(f) = jet.gradient;
+      Eigen::Map<SixSix>(energy.hessians.row(f).data()) = jet.hessian;
+    }
+    if (derivatives == Derivatives::kModel) make_convex(energy.hessians, begin, end);
   });
   energy.value = values.sum();
   if (second)

@@ -25,7 +25,8 @@ _FULL_STEP = 0.5  # a step at least this long lets the area term grow
 _AT_REST = "energy at rest"
 _STALLED = 3  # steps in a row without any length end the iteration
 _ROUGH = 8.0  # times the tolerance
-_BEST_STEPS = 2  # of the projection of the rings
+_BEST_STEPS = 2  # of the projection of the rings, where fewer do not serve
+_GOOD = 0.5  # times the tolerance: areas so good are to stay so
 _AHEAD = 3  # times the weight of the area term has grown at once on a finer surface
 _REST, _SLOW = 8, 0.01  # so many steps that lower the energy by less than this share end it, too
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
@@ -133,8 +134,6 @@ def finish_areas(
     start = time.perf_counter()
     history: list[IterationRecord] = []
     pace = Pace() if pace is None else pace
-    # Steps that are best for the faces, too, cost as much as three Newton steps each.
-    tries = (0, _BEST_STEPS) if pace.prolonged else (_BEST_STEPS,)
     tol = steps.tol
     worst = _MARGIN * tol if pace.prolonged else tol
     weight, least, heaviest = pace.weight, math.inf, _MOST_WEIGHT**steps.balance
@@ -162,6 +161,9 @@ def finish_areas(
     if steps.balance < 1.0:
         return history, reason == _AT_REST and history[-1].flips == 0, reason
     last = _weights(min(weight, _RING_WEIGHT), barrier)
+    # Steps that are best for the faces, too, cost as much as three Newton steps each.
+    fewest = 0 if pace.prolonged else _BEST_STEPS if _within(measured, _GOOD * tol) else 1
+    tries = dict.fromkeys((fewest, _BEST_STEPS))
     if rings and any(newton.project_rings(last, tol, _RATIO_GOAL * tol, best) for best in tries):
         history.append(_record("newton", len(history), None, newton.measures(), start))
     return history, *_verdict(newton.measures(), tol, reason)
