@@ -1,7 +1,19 @@
 # The library of all numerics; knows nothing of Python.
 file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS cpp/src/*.cpp)
 find_package(Threads REQUIRED)
-set(parts stretchmap_core)
+set(parts stretchmap_core stretchmap_wide)
+# Kernels for wider processors, chosen at run time. No contraction, so that all of them give the
+# same bits; and a part by itself: with a precompiled header, or in one unit with what may contract,
+# GCC forgets the options for functions of a target of their own.
+set(wide cpp/src/volume/tet_weights.cpp cpp/src/volume/tet_weights_avx2.cpp
+         cpp/src/volume/tet_weights_avx512.cpp cpp/src/volume/element_energy.cpp
+         cpp/src/volume/line_bound.cpp cpp/src/linalg/multigrid/block_products.cpp
+         cpp/src/linalg/multigrid/level_smoother.cpp
+         cpp/src/linalg/direct/dense_front.cpp cpp/src/area/phase_energies.cpp
+         cpp/src/area/convex_faces.cpp)
+list(TRANSFORM wide PREPEND "${CMAKE_SOURCE_DIR}/")
+list(REMOVE_ITEM core_sources ${wide})
+add_library(stretchmap_wide OBJECT ${wide})
 if(CMAKE_UNITY_BUILD)
   # Units are a few rooms each: what they share of Eigen is compiled once, and so few units read
   # their headers faster than a header is precompiled. Rooms in which a map spends next to no time
@@ -14,6 +26,7 @@ if(CMAKE_UNITY_BUILD)
   list(APPEND parts stretchmap_seldom)
 endif()
 add_library(stretchmap_core STATIC ${core_sources})
+target_sources(stretchmap_core PRIVATE $<TARGET_OBJECTS:stretchmap_wide>)
 foreach(part IN LISTS parts)
   target_include_directories(${part} PUBLIC cpp/include PRIVATE cpp/src)
   target_link_libraries(${part} PUBLIC Eigen3::Eigen Threads::Threads)
@@ -44,24 +57,12 @@ foreach(part IN LISTS parts)
   target_compile_options(${part} PRIVATE ${options})
 endforeach()
 
-# Kernels for wider processors, chosen at run time. No contraction, so that all of them give the
-# same bits; and each by itself: with a precompiled header, or in one unit with others, GCC forgets
-# the options for functions of a target of their own.
-set(wide cpp/src/volume/tet_weights.cpp cpp/src/volume/tet_weights_avx2.cpp
-         cpp/src/volume/tet_weights_avx512.cpp cpp/src/volume/element_energy.cpp
-         cpp/src/volume/line_bound.cpp cpp/src/linalg/multigrid/block_products.cpp
-         cpp/src/linalg/multigrid/level_smoother.cpp
-         cpp/src/linalg/direct/dense_front.cpp cpp/src/area/phase_energies.cpp
-         cpp/src/area/convex_faces.cpp)
 if(NOT MSVC)
-  set_source_files_properties(
-    ${wide} PROPERTIES COMPILE_OPTIONS -ffp-contract=off SKIP_PRECOMPILE_HEADERS ON
-                       SKIP_UNITY_BUILD_INCLUSION ON)
+  target_compile_options(stretchmap_wide PRIVATE -ffp-contract=off)
   if(x86)
-    set_source_files_properties(cpp/src/volume/tet_weights_avx2.cpp PROPERTIES
-                                COMPILE_OPTIONS "-ffp-contract=off;-mavx2")
-    set_source_files_properties(cpp/src/volume/tet_weights_avx512.cpp PROPERTIES
-                                COMPILE_OPTIONS "-ffp-contract=off;-mavx512f")
+    set_source_files_properties(cpp/src/volume/tet_weights_avx2.cpp PROPERTIES COMPILE_OPTIONS -mavx2)
+    set_source_files_properties(cpp/src/volume/tet_weights_avx512.cpp PROPERTIES COMPILE_OPTIONS
+                                                                                 -mavx512f)
   endif()
 endif()
 
@@ -73,7 +74,10 @@ if(CMAKE_UNITY_BUILD)
     list(FILTER sources INCLUDE REGEX "/cpp/src/${room}/")
     set_source_files_properties(${sources} PROPERTIES UNITY_GROUP ${room})
   endforeach()
-  set_target_properties(stretchmap_seldom PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
+  set_target_properties(stretchmap_seldom stretchmap_wide PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
+  set_source_files_properties(
+    cpp/src/volume/tet_weights_avx2.cpp cpp/src/volume/tet_weights_avx512.cpp
+    PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   target_sources(stretchmap_core PRIVATE $<TARGET_OBJECTS:stretchmap_seldom>)
   if(NOT MSVC)
     target_compile_options(stretchmap_seldom PRIVATE -O1)
@@ -83,10 +87,11 @@ else()
 endif()
 
 if(STRETCHMAP_SANITIZE)
-  target_compile_definitions(stretchmap_core PUBLIC _GLIBCXX_ASSERTIONS)
-  target_compile_options(
-    stretchmap_core PUBLIC -fsanitize=${STRETCHMAP_SANITIZE} -fno-sanitize-recover=all
-                           -fno-omit-frame-pointer -UNDEBUG)
+  foreach(part IN LISTS parts)
+    target_compile_definitions(${part} PUBLIC _GLIBCXX_ASSERTIONS)
+    target_compile_options(${part} PUBLIC -fsanitize=${STRETCHMAP_SANITIZE} -fno-omit-frame-pointer
+                                          -fno-sanitize-recover=all -UNDEBUG)
+  endforeach()
   target_link_options(stretchmap_core PUBLIC -fsanitize=${STRETCHMAP_SANITIZE})
 endif()
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "area/lanes.hpp"
 #include "stretchmap/base/clones.hpp"
 #include "stretchmap/linalg/symmetric.hpp"
 
@@ -10,8 +11,7 @@ namespace stretchmap::area {
 
 namespace {
 
-constexpr int kLanes = 8, kSize = 6, kSweeps = 12;
-using Lane = double[kLanes];
+constexpr int kSize = 6, kSweeps = 12;
 using SixSix = Eigen::Matrix<double, kSize, kSize>;
 
 // Symmetric matrices, one in each lane: A = Q' D Q in the end. The rows of A are its columns, too.

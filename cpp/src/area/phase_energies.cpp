@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "area/lanes.hpp"
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/base/clones.hpp"
 #include "stretchmap/base/parallel.hpp"
@@ -15,9 +16,7 @@
 namespace stretchmap::area {
 namespace {
 
-// Candidates rated at a time, one in each lane of the processor's vectors.
-constexpr int kLanes = 8;
-using Lane = double[kLanes];
+// Points of candidates that are rated at a time.
 struct LanePoint {
   alignas(64) Lane at[3];
 };
