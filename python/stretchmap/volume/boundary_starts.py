@@ -28,9 +28,11 @@ _log = logging.getLogger("stretchmap")
 
 _STEPS, _TOL = 100, 0.05
 _SEM_STEPS = 10
-_GENTLE = SHAPES[2]  # areas are far off
+_GENTLE = SHAPES[2], SHAPES[1]  # areas are far off
 _LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a limb
-_LESS_FAT = (1.6, 2.5)  # times that ratio, where coarse triangles fold
+# Times the ratio of the fattest, each with both weights of shape: coarse triangles fold on one, and
+# both sides of a thin wall get stuck in each other on another.
+_LESS_FAT = (1.0, 1.6, 2.5)
 _LOST = 1e-16  # of its area a face has no more
 # Share of the faces that do not look outward from which on turning them was not seen to succeed
 # where areas are equal (from 0.0317 on it failed, up to 0.0268 it did not).
@@ -104,7 +106,9 @@ class _BoundaryMaps:
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
         self.got_stuck = False
-        self.tori = iter([self.fatter_ratio * more for more in (1.0, *_LESS_FAT)])
+        self.gentler = iter(
+            [(self.fatter_ratio * more, shape) for more in _LESS_FAT for shape in _GENTLE]
+        )
 
     def gliding(self) -> Iterator[Callable[[], AreaMap | None]]:
         """What makes them one after the other, for a boundary that will move."""
@@ -112,11 +116,15 @@ class _BoundaryMaps:
         if self.ratio == "search":
             # Kept shapes are cheaper to make, and to compare with what was unfolded; where that
             # got stuck, equal areas lead further if they serve.
-            makers = self.gentle_on_fatter, self.fatter
-            yield from makers[::-1] if self.got_stuck else makers
+            if self.got_stuck:
+                yield self.fatter
             # Both sides of a thin wall can get stuck in each other on one torus, not on the next.
             yield self.gentle_on_fatter
-        yield lambda: self.gentle([self.ratio])
+            yield self.gentle_on_fatter
+            if not self.got_stuck:
+                yield self.fatter
+            yield self.gentle_on_fatter
+        yield lambda: self.gentle([(self.ratio, _GENTLE[0])])
         yield self.folded
         yield lambda: self.after(_STEPS)
 
@@ -154,25 +162,25 @@ class _BoundaryMaps:
 
     def gentle_on_fatter(self) -> AreaMap | None:
         """Another one each time, on less and less fat tori."""
-        return self.gentle(self.tori)
+        return self.gentle(self.gentler)
 
-    def gentle(self, ratios: Iterable[Ratio | float]) -> AreaMap | None:
+    def gentle(self, kept: Iterable[tuple[Ratio | float, float]]) -> AreaMap | None:
         """With shapes kept, on the first of some tori where every face looks outward."""
         # A long branch with few edges round it is folded wherever it has its area, and of a thin
         # shell both sides end up far from each other.
         proven = None
-        for ratio in ratios:
-            found = self._chart(ratio, _GENTLE)
+        for ratio, shape in kept:
+            found = self._chart(ratio, shape)
             if np.abs(found.distortion.ratios).min() < _LOST:
                 return self._unfolded(ratio, _LIGHTER)
-            kept = turned(found, self.progress) if self._not_outward(found) else found
-            if not self._not_outward(kept):
-                return kept
-            proven = proven or (kept if kept.certificate.certified else None)
+            outward = turned(found, self.progress) if self._not_outward(found) else found
+            if not self._not_outward(outward):
+                return outward
+            proven = proven or (outward if outward.certificate.certified else None)
         return proven
 
     def gentle_finished(self) -> AreaMap | None:
-        found = self.gentle([self.ratio])
+        found = self.gentle([(self.ratio, _GENTLE[0])])
         return found and finished(found, max_iter=_STEPS, tol=_TOL, progress=self.progress)
 
     def _unfolded(self, ratio: float | Ratio, shape: float = 0.0) -> AreaMap | None:

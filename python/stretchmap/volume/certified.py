@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import logging
 import math
 import time
+from collections.abc import Iterator
 
 from ..base.progress import Progress
 from ..mesh.meshes import TetMesh
@@ -34,7 +36,8 @@ def certified_map(
 ) -> VolumeMap:
     """The map from the first start that leads to a certified one, or the best there is.
 
-    Where folded faces had to be held for that, the others are tried in the time left.
+    Where folded faces had to be held for that, the others are tried in the time left. A start in
+    which many tets are stuck makes room for the next one; if none serves, the best is gone on with.
 
     Parameters
     ----------
@@ -52,13 +55,20 @@ def certified_map(
         starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)
     best, least, best_took = None, (True, 0, True, math.inf), 0.0
     vain, clock = 0.0, time.perf_counter()
-    for begin in starts:
+    left_off = None  # the best one, where it made room
+
+    def gone_on_with() -> Iterator[Start]:
+        if left_off is not None:
+            yield left_off
+
+    for begin in itertools.chain(starts, gone_on_with()):
         outcome = solve(
             begin.problem,
             options,
             glide=glide,
             budget=budget,
             patience=begin.patience,
+            hasty=begin.hasty,
             progress=progress,
         )
         seconds = {**outcome.seconds, "start": begin.seconds + outcome.seconds["start"]}
@@ -70,6 +80,10 @@ def certified_map(
         if best is None or rank < least:
             vain += best_took
             best, least, best_took = found, rank, took
+            again = dataclasses.replace(
+                begin, problem=outcome.problem, patience=1.0, hasty=False, others=0.0
+            )
+            left_off = again if begin.hasty else None
         else:
             vain += took
         if best.certificate.certified and not least[2]:

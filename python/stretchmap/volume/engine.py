@@ -37,12 +37,14 @@ __all__ = ["solve"]
 _log = logging.getLogger("stretchmap")
 
 _ROUNDS = 12
-_RINGS = (2, 4)  # reach of the patches, to begin with and where that does not help
+_RINGS = (2, 4, 8)  # reach of the patches, to begin with and where that does not help
 # Inverted tets: with a larger share of all, it is not a matter of single places.
 _MOST_STUCK = 0.05
+_HELPED = 0.95  # of them are left at most where patches are worth another round
+_HOPELESS = 0.01  # share of the tets for which another start is worth more than patches
 _FEW_STUCK = 30  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
-_NEARLY = 0.7  # share of the time left that untangling may take if only so few are left
+_NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
 
@@ -59,6 +61,7 @@ class _Run:
     history: History  # with the share of time that untangling may take, at first
     budget: Budget  # all of it
     on_mesh: bool = False  # whether the boundary is going to glide on one
+    hasty: bool = False  # whether another start is worth more than many tets that are stuck
     seconds: dict[str, float] = field(default_factory=dict)
 
     def take(self, problem: VolumeProblem) -> None:
@@ -88,6 +91,7 @@ def solve(
     glide: bool = False,
     budget: Budget | None = None,
     patience: float = 1.0,
+    hasty: bool = False,
     progress: Progress | None = None,
 ) -> Outcome:
     """Find a map without inverted tets and with little volume distortion.
@@ -103,6 +107,8 @@ def solve(
         Default: what the options allow.
     patience : float
         Share of it that untangling may take.
+    hasty : bool
+        Whether to end where many tets are stuck, as other starts follow.
     progress : Progress, optional
     """
     budget = budget or Budget.of(options, problem.solid.n_tets)
@@ -110,7 +116,7 @@ def solve(
     problem = started(problem, solver=options.solver)
     history = History(problem.model(options), budget.share(patience), progress)
     on_mesh = glide and problem.ground is not None
-    run = _Run(problem, options, history, budget, on_mesh)
+    run = _Run(problem, options, history, budget, on_mesh, hasty)
     run.seconds["start"] = time.perf_counter() - clock
     with run.timed("untangle"):
         left = _untangle(run, glide=glide and not on_mesh)
@@ -170,6 +176,8 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     """Inverted tets, and tets at folded faces, that are left."""
     history = run.history
     stuck, opened = _untangle_inside(run, glide=glide), None
+    if run.hasty and len(stuck) > _FEW_STUCK:
+        return len(stuck)
     if glide and not len(stuck):
         # A few folded faces are a matter of what is round them; for their sake all the rest would
         # be turned over once more.
@@ -224,6 +232,8 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     """
     history = run.history
     run.x = untangle_whole(history.model, run.x, history, glide=False).x
+    if run.hasty and _inverted(run) > _HOPELESS * len(history.model.T):
+        return stuck_tets(history.model, run.x, glide=False)
     stuck = _patched(run, glide=False)
     if glide and 0 < len(stuck) <= _FEW_STUCK:
         more = run.budget.share(_NEARLY)
@@ -233,6 +243,8 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         return stuck
     if run.on_mesh and _freed(run):
         return stuck[:0]
+    if run.hasty and len(stuck) > _FEW_STUCK:
+        return stuck
     before = run.problem
     run.x = untangle_whole(history.model, run.x, history, glide=False, thorough=True).x
     left = _patched(run, glide=False)
@@ -259,7 +271,7 @@ def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
-    """Untangle patches, small ones and then larger, as long as that helps; tets that are left."""
+    """Untangle patches as long as that helps, and then larger ones; tets that are left."""
     model, budget = run.history.model, run.history.budget
     stuck = stuck_tets(model, run.x, glide=glide)
     rings = iter(_RINGS)
@@ -267,11 +279,13 @@ def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     while 0 < len(stuck) <= _MOST_STUCK * len(model.T) and not budget.spent:
         x = untangle_patches(model, run.x, stuck, rings=reach, glide=glide, budget=budget)
         left = stuck_tets(model, x, glide=glide)
+        helped = len(left) <= min(_HELPED * len(stuck), len(stuck) - 1)
         if len(left) < len(stuck):
             run.x, stuck = x, left
+        if helped:
             continue
         larger = next(rings, None)
-        if larger is None:
+        if larger is None or (run.hasty and len(stuck) > _FEW_STUCK):
             break
         reach = larger
     return stuck

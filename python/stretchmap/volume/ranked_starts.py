@@ -24,6 +24,7 @@ __all__ = ["Start", "ranked_starts"]
 # Share of tets the harmonic map turns over from which on it tells more about a start than the order
 # in which they are made: of a thin shell it is a fifth from one, and a thousandth from another.
 _MANY, _FEW = 0.05, 0.01
+_CLEARLY = 0.1  # share of what the first turns over that is few, too
 _COMPARED = 4  # unless one before turns few over
 _COMPARING = 0.3  # share of the time left that may go into them
 # Share of the time left that untangling may take from each in turn; half of it if the boundary is
@@ -41,6 +42,7 @@ class Start:
     patience: float = 1.0  # share of the time left that untangling may take
     seconds: float = 0.0  # that the harmonic map took
     others: float = 0.0  # seconds that those took it was compared with
+    hasty: bool = False  # whether it makes room for the next where many tets are stuck
 
     @property
     def inverted(self) -> float:
@@ -68,7 +70,7 @@ def ranked_starts(
             problem = VolumeProblem.of(solid, found.image, torus=found.torus, refine=options.refine)
             problem = started(problem, solver=options.solver)
             patience = 1.0 if found.certificate.certified else 0.5
-            yield Start(found, problem, patience, time.perf_counter() - clock)
+            yield Start(found, problem, patience, time.perf_counter() - clock, hasty=True)
 
     starts = _best_first(begun(), budget) if glide else begun()
     for start, share in zip(
@@ -88,11 +90,16 @@ def _best_first(starts: Iterator[Start], budget: Budget) -> Iterator[Start]:
         allowed, others = budget.share(_COMPARING), itertools.islice(starts, _COMPARED - 1)
         while made < (left := allowed.left) and (other := next(others, None)) is not None:
             few.append(other)
-            if other.inverted <= _FEW:
+            if other.inverted <= max(_FEW, _CLEARLY * few[0].inverted):
                 break
             made = left - allowed.left
         if len(few) > 1:
             few.sort(key=lambda start: start.inverted)
             few[0] = replace(few[0], others=time.perf_counter() - clock)
-    yield from few
+    least = few[0].inverted
+    beaten = [start for start in few[1:] if start.inverted > max(_MANY, least / _CLEARLY)]
+    yield from few[: len(few) - len(beaten)]
+    if beaten:  # by far: the others that might have been compared are worth more
+        yield from itertools.islice(starts, _COMPARED - len(few))
+    yield from beaten
     yield from starts

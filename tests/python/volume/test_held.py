@@ -127,6 +127,24 @@ def test_what_is_not_certified_has_not_converged(monkeypatch):
     assert not result.converged and result.certificate.reason in result.stop_reason
 
 
+def test_the_best_start_is_gone_on_with_where_none_serves(monkeypatch):
+    hasty, solve = [], certified.solve
+
+    def stuck(problem, options, **keywords):
+        hasty.append(keywords["hasty"])
+        found = solve(problem, options, **keywords)
+        if not hasty[-1]:
+            return found
+        x = problem.x.copy()
+        x[np.setdiff1d(np.arange(len(x)), problem.solid.boundary_vertices)] *= -1.0 + len(hasty) / 9
+        return dataclasses.replace(found, problem=dataclasses.replace(problem, x=x))
+
+    monkeypatch.setattr(certified, "solve", stuck)
+    result = sm.volume_map(SOLID)
+    assert hasty == [True] * (len(hasty) - 1) + [False] and len(hasty) > 3
+    assert result.certificate.certified
+
+
 def test_the_first_start_has_no_folded_face_if_that_can_be_had():
     solid = with_branch(sm.samples.bumpy_torus(1000), 10, 0.5)
     starts = list(boundary_starts(solid, VolumeOptions(), glide=True, progress=None))

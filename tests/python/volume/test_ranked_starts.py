@@ -71,7 +71,21 @@ def test_one_that_turns_many_over_waits_for_better_ones(monkeypatch, plain):
 def test_one_that_turns_few_over_is_not_compared_further(monkeypatch, plain):
     bad, worse = twisted(plain, 2.0), twisted(plain, 4.0)
     order, known = ranked(monkeypatch, [bad, worse, plain, bad])
-    assert [id(found) for found in order] == [id(k) for k in (plain, bad, worse, bad)]
+    assert [id(found) for found in order] == [id(k) for k in (plain, bad, bad, worse)]
+    assert known[0] == 3
+
+
+def test_one_that_turns_a_tenth_as_many_over_is_not_compared_further(monkeypatch, plain):
+    shares = {}
+    monkeypatch.setattr(module.Start, "inverted", property(lambda self: shares[id(self.map)]))
+    maps = [dataclasses.replace(plain) for _ in range(5)]
+    shares.update(zip(map(id, maps), (0.5, 0.04, 0.03, 0.0, 0.0), strict=True))
+    order, known = ranked(monkeypatch, maps)
+    assert [id(found) for found in order] == [id(maps[k]) for k in (1, 2, 3, 0, 4)]
+    assert known[:4] == [2, 3, 4, 4]  # the first, beaten by far, comes after what was not compared
+    shares[id(maps[1])] = 0.06
+    order, known = ranked(monkeypatch, maps)
+    assert [id(found) for found in order] == [id(maps[k]) for k in (2, 1, 3, 0, 4)]
     assert known[0] == 3
 
 
@@ -114,7 +128,7 @@ def test_patience_is_for_the_proven_and_for_the_measured(monkeypatch, plain):
     assert patience([bad, poor]) == [0.4, 0.6]
 
 
-@pytest.mark.parametrize(("left", "tried"), [(0.2, 3), (0.05, 1)])
+@pytest.mark.parametrize(("left", "tried"), [(0.2, 4), (0.05, 1)])
 def test_no_start_is_made_with_hardly_any_time_left(monkeypatch, plain, left, tried):
     begun = []
     inner = np.ones(SOLID.n_vertices, dtype=bool)
@@ -125,7 +139,7 @@ def test_no_start_is_made_with_hardly_any_time_left(monkeypatch, plain, left, tr
 
     def fails(problem, *_, **__):
         begun.append(problem)
-        turned = dataclasses.replace(problem, x=problem.x * np.where(inner, -1.0, 1.0)[:, None])
+        turned = dataclasses.replace(problem, x=problem.x * ~inner[:, None])
         return Outcome(turned, (), False, "no", {"start": 0.0})
 
     monkeypatch.setattr(module, "boundary_starts", lambda *_, **__: iter([plain] * 3))
@@ -184,13 +198,13 @@ def test_shapes_weigh_less_where_they_would_lose_a_limb(monkeypatch):
     monkeypatch.setattr(boundary_starts_module, "turned", lambda found, _: found)
     monkeypatch.setattr(type(maps), "_not_outward", lambda _, found: found.folded)
     monkeypatch.setattr(type(maps), "_chart", charts(1e-3))
-    assert maps.gentle([2.0]).shape == 100.0
+    assert maps.gentle([(2.0, 100.0)]).shape == 100.0
     monkeypatch.setattr(type(maps), "_chart", charts(1e-20))
-    assert maps.gentle([2.0]).shape == 10.0
+    assert maps.gentle([(2.0, 100.0)]).shape == 10.0
 
 
 @pytest.mark.parametrize(
-    ("outward", "ratio", "folded"), [(1.0, 1.5, 0), (3.0, 3.75, 2), (9.0, 2.4, 3)]
+    ("outward", "ratio", "folded"), [(1.0, 1.5, 0), (3.0, 3.75, 4), (9.0, 2.4, 6)]
 )
 def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch, outward, ratio, folded):
     turned = []
@@ -203,9 +217,12 @@ def test_the_fattest_torus_on_which_kept_shapes_have_no_fold(monkeypatch, outwar
     found = made.gentle_on_fatter()
     assert found.ratio == pytest.approx(ratio)  # the last is proven, though folded
     # what looks outward everywhere has nothing to turn
-    assert [one.ratio for one in turned] == pytest.approx([1.5, 2.4, 3.75][:folded])
-    again = made.gentle_on_fatter()
-    assert (again and again.ratio) == (pytest.approx(2.4) if ratio == 1.5 else None)
+    tori = [1.5, 1.5, 2.4, 2.4, 3.75, 3.75]
+    assert [one.ratio for one in turned] == pytest.approx(tori[:folded])
+    assert [one.shape for one in turned] == [100.0, 10.0, 100.0, 10.0, 100.0, 10.0][:folded]
+    again = made.gentle_on_fatter()  # the same torus with less weight of shape, if that is left
+    assert (again and again.shape) == (None if folded == 6 else 10.0)
+    assert again is None or again.ratio == found.ratio
 
 
 def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
@@ -234,8 +251,10 @@ def test_equal_areas_come_before_kept_shapes_only_where_turning_just_failed(
     monkeypatch.setattr(boundary_starts_module, "turned", lambda found, _: found)
     makers = maps.gliding()
     assert (next(makers)() is None) == skipped
-    order = [next(makers), next(makers)]
-    assert order == [maps.gentle_on_fatter, maps.fatter][:: 1 if first == "gentle" else -1]
+    order = [next(makers) for _ in range(4)]
+    where = 2 if first == "gentle" else 0
+    assert [make == maps.fatter for make in order] == [k == where for k in range(4)]
+    assert order.count(maps.gentle_on_fatter) == 3
 
 
 @pytest.mark.parametrize("size", [(7, 1, 7), (9, 1, 9), (8, 2, 9)])

@@ -169,3 +169,51 @@ def test_single_elements_are_relaxed_on_a_torus():
     measures = np.linspace(-0.5, 0.5, 20_000)
     near = Relaxation(run.history.model)._near_folding(measures)
     assert np.array_equal(np.flatnonzero(near), np.arange(4))
+
+
+@pytest.mark.parametrize(("stuck", "hopeless"), [(3, False), (300, False), (300, True)])
+def test_a_start_makes_room_for_the_next_where_many_tets_are_stuck(monkeypatch, stuck, hopeless):
+    run = run_of(sm.samples.bumpy_torus(600))
+    run.hasty, done = True, []
+
+    def whole(model, x, history, *, glide, thorough=False):
+        done.append("thorough" if thorough else "whole")
+        return Untangled(x, stuck, -1.0)
+
+    def patched(run, *, glide):
+        done.append("patches")
+        return np.arange(stuck)
+
+    monkeypatch.setattr(engine, "untangle_whole", whole)
+    monkeypatch.setattr(engine, "_patched", patched)
+    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck: stuck)
+    monkeypatch.setattr(engine, "_inverted", lambda run: len(run.problem.solid.T) * hopeless)
+    monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: np.arange(stuck))
+    assert len(engine._untangle_inside(run, glide=True)) == stuck
+    assert done == ["whole"] if hopeless else ["whole", "patches"]
+    assert ("thorough" in done) == (stuck == 3)
+    if stuck == 300:
+        monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(stuck))
+        assert engine._untangle(run, glide=True) == stuck  # nothing else is tried either
+
+
+@pytest.mark.parametrize(("left", "rings"), [(200, [2, 4, 8]), (150, [2, 2, 2, 2, 4, 8])])
+def test_patches_reach_further_where_they_hardly_help(monkeypatch, left, rings):
+    """So many of 200 stuck tets are left the first time, and three quarters of these the next."""
+    run = run_of(sm.samples.bumpy_torus(6000))
+    run.x = np.full(run.x.shape, 200.0)
+    reached = []
+
+    def patches(model, x, stuck, *, rings, glide, budget):
+        reached.append(rings)
+        found = {200: left, 150: 100, 100: 60, 60: 58, 58: 57, 57: 56}[int(x[0, 0])]
+        return np.full(x.shape, float(found))
+
+    monkeypatch.setattr(engine, "untangle_patches", patches)
+    monkeypatch.setattr(engine, "stuck_tets", lambda model, x, glide: np.arange(int(x[0, 0])))
+    assert len(engine._patched(run, glide=False)) == (200 if left == 200 else 56)
+    assert reached == rings
+    reached.clear()
+    run.x, run.hasty = np.full(run.x.shape, 200.0), True
+    engine._patched(run, glide=False)
+    assert reached == [two for two in rings if two == 2]
