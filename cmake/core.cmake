@@ -17,9 +17,10 @@ add_library(stretchmap_wide OBJECT ${wide})
 if(CMAKE_UNITY_BUILD)
   # Units are a few rooms each: what they share of Eigen is compiled once, and so few units read
   # their headers faster than a header is precompiled. Rooms in which a map spends next to no time
-  # are a part of their own, optimized less.
+  # are a part of their own, optimized less, and so is Eigen's dense algebra.
   set(seldom ${core_sources})
-  list(FILTER seldom INCLUDE REGEX "/cpp/src/(certificate|forms|homology|mesh|partitions)/")
+  set(rooms "certificate|forms|homology|mesh|partitions")
+  list(FILTER seldom INCLUDE REGEX "/cpp/src/((${rooms})/|linalg/symmetric.cpp)")
   list(FILTER seldom EXCLUDE REGEX "/mesh/size.cpp")
   list(REMOVE_ITEM core_sources ${seldom})
   add_library(stretchmap_seldom OBJECT ${seldom})
@@ -43,7 +44,9 @@ if(MSVC)
   set(warnings /W3)
   set(options ${warnings} /bigobj /utf-8)
 else()
-  set(warnings -Wall -Wextra -Wpedantic -Wshadow)
+  if(NOT CMAKE_UNITY_BUILD) # to look for them is a hundredth of the work, and for developers
+    set(warnings -Wall -Wextra -Wpedantic -Wshadow)
+  endif()
   set(strict $<$<BOOL:${STRETCHMAP_WERROR}>:-Werror>)
   # Nobody reads errno or traps: without them loops with roots and choices can be vectorized.
   set(options ${warnings} -fno-math-errno -fno-trapping-math ${strict})

@@ -11,10 +11,10 @@ set(unused src/plugins/IndexedViewMethods.h src/plugins/ReshapedMethods.h)
 # written differently are left as they are.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND Eigen3_VERSION MATCHES "^3[.]4[.][01]$")
   set(shortened
-      Geometry src/Core/ArrayBase.h src/Core/DenseBase.h src/Core/DenseCoeffsBase.h src/Core/Dot.h
-      src/Core/MapBase.h src/Core/MatrixBase.h src/Core/PlainObjectBase.h src/Core/Redux.h
-      src/Core/SolverBase.h src/Core/StableNorm.h src/Core/util/Macros.h src/LU/Determinant.h
-      src/SparseCore/SparseRedux.h)
+      Geometry src/Core/ArrayBase.h src/Core/Block.h src/Core/DenseBase.h
+      src/Core/DenseCoeffsBase.h src/Core/Dot.h src/Core/MapBase.h src/Core/MatrixBase.h
+      src/Core/PlainObjectBase.h src/Core/Redux.h src/Core/SolverBase.h src/Core/StableNorm.h
+      src/Core/util/Macros.h src/LU/Determinant.h src/SparseCore/SparseRedux.h)
 endif()
 
 set(own ${unused} ${shortened})
@@ -28,6 +28,9 @@ foreach(header IN LISTS shortened)
   file(READ "${found}/Eigen/${header}" text)
   if(header STREQUAL Geometry)
     string(REPLACE "#include \"SVD\"" "" text "${text}")
+  elseif(header MATCHES "Block")
+    string(REPLACE "typedef typename traits<XprType>::Scalar Scalar;"
+                   "using typename traits<XprType>::Scalar;" text "${text}")
   elseif(header MATCHES "Macros")
     foreach(name Scalar RealScalar CoeffReturnType PacketScalar)
       string(REGEX REPLACE "typedef typename [A-Za-z:<>]+ ${name};" "using typename Base::${name};"
