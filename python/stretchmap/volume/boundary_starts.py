@@ -28,7 +28,7 @@ _log = logging.getLogger("stretchmap")
 
 _STEPS, _TOL = 100, 0.05
 _SEM_STEPS = 10
-_GENTLE = SHAPES[2], SHAPES[1]  # areas are far off
+_GENTLE = SHAPES[2]  # areas are far off
 _LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a limb
 # Times the ratio of the fattest, each with both weights of shape: coarse triangles fold on one, and
 # both sides of a thin wall get stuck in each other on another.
@@ -106,9 +106,8 @@ class _BoundaryMaps:
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
         self.got_stuck = False
-        self.gentler = iter(
-            [(self.fatter_ratio * more, shape) for more in _LESS_FAT for shape in _GENTLE]
-        )
+        tori = [self.fatter_ratio * more for more in _LESS_FAT]
+        self.gentler = iter([(ratio, shape) for ratio in tori for shape in (_GENTLE, _LIGHTER)])
 
     def gliding(self) -> Iterator[Callable[[], AreaMap | None]]:
         """What makes them one after the other, for a boundary that will move."""
@@ -124,7 +123,7 @@ class _BoundaryMaps:
             if not self.got_stuck:
                 yield self.fatter
             yield self.gentle_on_fatter
-        yield lambda: self.gentle([(self.ratio, _GENTLE[0])])
+        yield lambda: self.gentle([(self.ratio, _GENTLE)])
         yield self.folded
         yield lambda: self.after(_STEPS)
 
@@ -180,7 +179,7 @@ class _BoundaryMaps:
         return proven
 
     def gentle_finished(self) -> AreaMap | None:
-        found = self.gentle([(self.ratio, _GENTLE[0])])
+        found = self.gentle([(self.ratio, _GENTLE)])
         return found and finished(found, max_iter=_STEPS, tol=_TOL, progress=self.progress)
 
     def _unfolded(self, ratio: float | Ratio, shape: float = 0.0) -> AreaMap | None:

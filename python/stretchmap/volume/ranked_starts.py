@@ -83,7 +83,8 @@ def ranked_starts(
 def _best_first(starts: Iterator[Start], budget: Budget) -> Iterator[Start]:
     """As they come, but for the first few; those are two, and no more than time allows, if each
     takes as long as the one before. How long the first took tells nothing: it includes the search
-    for a torus."""
+    for a torus. Those that the best beats by far come after others that might have been compared.
+    """
     few = [next(starts)]
     if few[0].inverted > _MANY:
         made, clock = 0.0, time.perf_counter()
@@ -99,7 +100,7 @@ def _best_first(starts: Iterator[Start], budget: Budget) -> Iterator[Start]:
     least = few[0].inverted
     beaten = [start for start in few[1:] if start.inverted > max(_MANY, least / _CLEARLY)]
     yield from few[: len(few) - len(beaten)]
-    if beaten:  # by far: the others that might have been compared are worth more
+    if beaten:
         yield from itertools.islice(starts, _COMPARED - len(few))
     yield from beaten
     yield from starts
