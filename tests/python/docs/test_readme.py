@@ -1,4 +1,4 @@
-"""The README holds what it promises: its snippets run, its commands exist, its picture is there."""
+"""README and first pages hold what they promise: snippets run, commands exist, links lead on."""
 
 from __future__ import annotations
 
@@ -9,25 +9,37 @@ from pathlib import Path
 
 import pytest
 
-from stretchmap.cli import main
+from stretchmap.cli import GROUPS, main
 
 ROOT = Path(__file__).resolve().parents[3]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
+def blocks(language, text=README):
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S)
 
 
-def test_python_snippets_run_one_after_the_other(tmp_path, monkeypatch, capsys):
+def test_the_readme_is_one_screen_with_two_commands():
+    assert len(README.splitlines()) <= 70
+    assert len(blocks("sh")) == 2 and README.count("![") == 1
+
+
+@pytest.mark.parametrize(
+    ("page", "count", "files"),
+    [
+        ("README.md", 1, {"part_map.npz"}),
+        ("docs/quickstart.md", 3, {"part_map.npz", "part.png"}),
+    ],
+)
+def test_python_snippets_run_one_after_the_other(page, count, files, tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    snippets = blocks("python")
-    assert len(snippets) >= 3
+    snippets = blocks("python", (ROOT / page).read_text(encoding="utf-8"))
+    assert len(snippets) == count
     for snippet in snippets:
-        exec(compile(snippet, "README.md", "exec"), names)
-    assert {"part_map.npz", "part.png"} <= {p.name for p in tmp_path.iterdir()}
+        exec(compile(snippet, page, "exec"), names)
+    assert files <= {p.name for p in tmp_path.iterdir()}
     assert "certified" in capsys.readouterr().out
 
 
@@ -40,16 +52,28 @@ def test_ci_runs_the_readmes_test_command():
 
 
 def test_every_command_of_the_table_exists(capsys):
-    pytest.importorskip("typer")
-    commands = {line.split()[1] for line in re.findall(r"`(stretchmap \w[^`]*)`", README)}
-    assert {"volume", "demo", "certify"} <= commands
+    typer = pytest.importorskip("typer")
+    from stretchmap.cli.app import application
+
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    commands = {line.split()[1] for line in re.findall(r"`(stretchmap [a-z][^`]*)`", page)}
+    assert commands == set(typer.main.get_command(application(GROUPS)).commands)
     for command in commands:
         assert main([command, "--help"]) == 0
         help_text = capsys.readouterr().out
-        for line in re.findall(rf"`(stretchmap {command}\b[^`]*)`", README):
+        for line in re.findall(rf"`(stretchmap {command}\b[^`]*)`", page):
             for option in shlex.split(line.replace("[", " ").replace("]", " ")):
                 if option.startswith("-"):
                     assert re.search(rf"(^|[\s,]){option}\b", help_text), f"{command} {option}"
+
+
+def test_every_extra_is_listed_with_its_licenses():
+    tomllib = pytest.importorskip("tomllib")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \|[^|]+\| [^|]+ \|$", page, re.M)
+    extras = project["optional-dependencies"].keys() - {"bench", "test", "docs", "all"}
+    assert set(rows) == extras and len(rows) == len(extras)
 
 
 PAGES = sorted(
