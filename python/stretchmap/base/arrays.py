@@ -236,7 +236,7 @@ def describe(what: str, ids: ArrayLike, limit: int = 5) -> str:
     rows = [tuple(row) if isinstance(row, list) else row for row in rows]
     if len(rows) == 1:
         return f"{what} {rows[0]}"
-    plural = {"vertex": "vertices"}.get(what, what + "s")
+    plural = what[:-2] + "ices" if what.endswith("vertex") else what + "s"
     tail = ", ..." if len(rows) > limit else ""
     return f"{len(rows)} {plural} ({', '.join(str(row) for row in rows[:limit])}{tail})"
 

@@ -100,13 +100,14 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
         state = "converged" if self.converged else "not converged"
         return f"{type(self).__name__}({size}, {state})"
 
-    def plot(self, kind: Kind, **options: Any) -> Figure:
+    def plot(self, kind: Kind | None = None, **options: Any) -> Figure:
         """Picture of the map.
 
         Parameters
         ----------
-        kind : str
-            One of ``stretchmap.plot.kinds(result)``: ``"levels"``, ``"checkerboard"``, ...
+        kind : str, optional
+            One of ``stretchmap.plot.kinds(result)``: ``"levels"``, ``"checkerboard"``, ...; by
+            default the first of them.
         **options
             Those of the function of that name in ``stretchmap.plot``.
 
@@ -123,6 +124,8 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
         """
         import stretchmap  # the front door loads pictures when they are asked for
 
+        if kind is None:
+            kind = stretchmap.plot.kinds(self)[0]
         return stretchmap.plot.picture(self, kind, **options)
 
     def with_fields(

@@ -46,7 +46,7 @@ def as_solid(mesh: Any, name: str = "solid") -> TetMesh:
     if isinstance(mesh, TriMesh):
         raise KindError(
             f"{name}: a TriMesh was given where a TetMesh is needed; fill it with tets, "
-            "stretchmap.samples.tetrahedralize(surface)"
+            "stretchmap.tetrahedralize(surface)"
         )
     raise KindError(f"{name}: {_remedy(mesh, 'TetMesh', 'TetMesh(V, T)')}")
 

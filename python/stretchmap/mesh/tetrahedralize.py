@@ -65,7 +65,7 @@ def tetrahedralize(
     --------
     >>> import stretchmap as sm
     >>> surface = sm.samples.torus_surface(12, 6)
-    >>> solid = sm.samples.tetrahedralize(surface)  # doctest: +SKIP
+    >>> solid = sm.tetrahedralize(surface)  # doctest: +SKIP
     """
     surface, quality = as_surface(surface), real("quality", quality, above=1.0)
     if max_volume is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stretchmap.base.arrays import as_indices, as_integers, as_points, as_reals
+from stretchmap.base.arrays import as_indices, as_integers, as_points, as_reals, describe
 from stretchmap.errors import ArrayError, IndexRangeError, NonFiniteError
 
 
@@ -91,3 +91,11 @@ def test_integers():
         with pytest.raises(IndexRangeError, match=f"row 1 does not: {big}") as caught:
             as_integers(np.array([0, big], np.int64 if big < 2**63 else np.uint64), "a", (2,))
         assert caught.value.ids == (1,)
+
+
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [("face", "2 faces (0, 1)"), ("boundary vertex", "2 boundary vertices (0, 1)")],
+)
+def test_ids_are_named_in_english(what, said):
+    assert describe(what, [0, 1]) == said and describe(what, [7]) == f"{what} 7"

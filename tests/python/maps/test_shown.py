@@ -61,5 +61,7 @@ def test_a_map_draws_itself(result):
     for kind in ("ratios", "convergence"):  # one after the other: no module may take a name over
         drawn = result.plot(kind)
         assert drawn.axes and drawn._repr_png_().startswith(b"\x89PNG")
+    first = [axes.get_title() for axes in result.plot(sm.plot.kinds(result)[0]).axes]
+    assert [axes.get_title() for axes in result.plot().axes] == first
     with pytest.raises(OptionError, match="kind must be"):
         result.plot("portrait")
