@@ -15,13 +15,18 @@ namespace stretchmap::area {
 namespace {
 
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
-constexpr int kStiffSteps = 6;       // towards it at most
-constexpr double kGain = 3e-2;       // a step that leaves no more than this keeps its factor
+constexpr int kRingSteps = 12;       // towards it at most
+constexpr int kWorth = 8;            // steps a factor is kept for: a new one costs as much
 constexpr int kGlideTries = 30;
 constexpr double kHoldRotation = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
 Points2 as_rows(const Vec& vector) {
   return Eigen::Map<const Points2>(vector.data(), vector.size() / 2, 2);
+}
+
+// Whether `kWorth` more steps that gain what the last one did suffice.
+bool nearly_exact(double before, double after) {
+  return after * std::pow(after / before, kWorth) <= kRingGoal;
 }
 
 // Rotations about the axis cost nothing; without this rounding decides how far they go.
@@ -87,12 +92,13 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std
   };
   SurfaceMeasures now = before;
   try {
-    for (int step = 0; step < best_steps; ++step) now = take(RingStep::kBest);
-    RingStep kind = RingStep::kStiff;
-    for (int step = 0; step < kStiffSteps && now.ring_std > kRingGoal; ++step) {
+    RingStep kind = best_steps > 0 ? RingStep::kBest : RingStep::kStiff;
+    for (int step = 0; step < kRingSteps && now.ring_std > kRingGoal; ++step) {
       const double sd = now.ring_std;
       now = take(kind);
-      kind = now.ring_std <= kGain * sd ? RingStep::kAgain : RingStep::kStiff;
+      kind = step + 1 < best_steps            ? RingStep::kBest
+             : nearly_exact(sd, now.ring_std) ? RingStep::kAgain
+                                              : RingStep::kStiff;
     }
   } catch (const Error&) {  // singular: nothing to be had
     now.ring_std = std::numeric_limits<double>::infinity();

@@ -16,7 +16,7 @@ namespace {
 constexpr double kGive = 1e-9;
 constexpr double kRingRidge = 1e-10;  // holds the rotation about the axis
 constexpr int kRefinements = 3;
-constexpr double kAccuracy = 1e-7;
+constexpr double kAccuracy = 1e-5;
 
 struct Rings {
   Vec source, image;  // (n) areas of the rings

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <vector>
 
 #include "stretchmap/base/clones.hpp"
@@ -20,14 +21,37 @@ constexpr Index kBlock = 32;           // columns of a panel eliminated one by o
 
 Index tiles(Index n, Index size) { return (n + size - 1) / size; }
 
-// tile[j][i] = sum over k of a[k][i] b[k][j]
-STRETCHMAP_CLONES void multiply_tile(const double* a, const double* b, Index depth, double* tile) {
-  double sum[kWide][kTall] = {};
-  for (Index k = 0; k < depth; ++k, a += kTall, b += kWide)
-    for (Index j = 0; j < kWide; ++j)
-      for (Index i = 0; i < kTall; ++i) sum[j][i] += a[i] * b[j];
-  for (Index j = 0; j < kWide; ++j)
-    for (Index i = 0; i < kTall; ++i) tile[kTall * j + i] = sum[j][i];
+// A column of a tile. Left to itself GCC loads what it is multiplied with as a vector and permutes
+// that, at half the speed.
+#if defined(__GNUC__)
+using Column = double __attribute__((vector_size(kTall * sizeof(double))));
+#else
+using Column = Eigen::Array<double, kTall, 1>;
+#endif
+
+// target(i, j) -= sum over k of a[k][i] b[k][j], i < tall, j < wide; its columns `stride` apart.
+STRETCHMAP_CLONES void subtract_tile(const double* a, const double* b, Index depth, double* target,
+                                     std::ptrdiff_t stride, Index tall, Index wide) {
+  Column sum[kWide];
+  for (Column& column : sum) std::memset(&column, 0, sizeof(column));
+  for (Index k = 0; k < depth; ++k, a += kTall, b += kWide) {
+    Column left;
+    std::memcpy(&left, a, sizeof(left));
+    for (Index j = 0; j < kWide; ++j) sum[j] += left * b[j];
+  }
+  if (tall == kTall && wide == kWide) {
+    for (Index j = 0; j < kWide; ++j) {
+      Column column;
+      std::memcpy(&column, target + j * stride, sizeof(column));
+      column -= sum[j];
+      std::memcpy(target + j * stride, &column, sizeof(column));
+    }
+    return;
+  }
+  double tile[kWide * kTall];
+  std::memcpy(tile, sum, sizeof(tile));
+  for (Index j = 0; j < wide; ++j)
+    for (Index i = 0; i < tall; ++i) target[j * stride + i] -= tile[kTall * j + i];
 }
 
 // The columns right of `c` up to `end`, and the rows from there on up to `end`, less the outer
@@ -99,15 +123,11 @@ void update(const Target& target, const double* panel, std::ptrdiff_t rows, Inde
         for (Index t = 0; t < height; t += kTall) {
           const Index row = top + t, column = s * kWide;
           if (row + kTall <= column) continue;
-          double tile[kTall * kWide];
-          multiply_tile(left.data() + static_cast<std::ptrdiff_t>(t) * deep,
-                        right.data() + static_cast<std::ptrdiff_t>(column) * deep, deep, tile);
-          const Index tall = std::min(kTall, target.rows - row);
-          const Index wide = std::min(kWide, target.columns - column);
-          for (Index j = 0; j < wide; ++j) {
-            double* to = target.data + (column + j) * target.stride + row;
-            for (Index i = 0; i < tall; ++i) to[i] -= tile[kTall * j + i];
-          }
+          subtract_tile(left.data() + static_cast<std::ptrdiff_t>(t) * deep,
+                        right.data() + static_cast<std::ptrdiff_t>(column) * deep, deep,
+                        target.data + column * target.stride + row, target.stride,
+                        std::min(kTall, target.rows - row),
+                        std::min(kWide, target.columns - column));
         }
     });
   }
