@@ -61,6 +61,8 @@ TetWeightsKernel tet_weights_avx2() {
 
 #else
 
-stretchmap::TetWeightsKernel stretchmap::tet_weights_avx2() { return nullptr; }
+namespace stretchmap::volume {
+TetWeightsKernel tet_weights_avx2() { return nullptr; }
+}  // namespace stretchmap::volume
 
 #endif

@@ -75,6 +75,8 @@ TetWeightsKernel tet_weights_avx512() {
 
 #else
 
-stretchmap::TetWeightsKernel stretchmap::tet_weights_avx512() { return nullptr; }
+namespace stretchmap::volume {
+TetWeightsKernel tet_weights_avx512() { return nullptr; }
+}  // namespace stretchmap::volume
 
 #endif
