@@ -14,7 +14,7 @@ import pytest
 import stretchmap
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-ROOMS = ("", *(f".{room}" for room in stretchmap._ROOMS), ".plot.populations")
+ROOMS = ("", *(f".{room}" for room in stretchmap._ROOMS), ".plot.populations", ".plot.scene")
 
 
 def listed(text: str) -> Iterator[Any]:
