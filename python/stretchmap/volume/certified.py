@@ -37,7 +37,7 @@ def certified_map(
     """The map from the first start that leads to a certified one, or the best there is.
 
     Where folded faces had to be held for that, the others are tried in the time left. A start in
-    which many tets are stuck makes room for the next one; if none serves, the best is gone on with.
+    which tets stay stuck makes room for the next one; if none serves, the best is gone on with.
 
     Parameters
     ----------

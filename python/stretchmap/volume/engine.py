@@ -36,7 +36,7 @@ __all__ = ["solve"]
 
 _log = logging.getLogger("stretchmap")
 
-_ROUNDS = 12
+_ROUNDS, _HASTY_ROUNDS = 12, 2  # of halving edges; fewer where another start follows
 _RINGS = (2, 4, 8)  # reach of the patches, to begin with and where that does not help
 # Inverted tets: with a larger share of all, it is not a matter of single places.
 _MOST_STUCK = 0.05
@@ -61,7 +61,7 @@ class _Run:
     history: History  # with the share of time that untangling may take, at first
     budget: Budget  # all of it
     on_mesh: bool = False  # whether the boundary is going to glide on one
-    hasty: bool = False  # whether another start is worth more than many tets that are stuck
+    hasty: bool = False  # whether another start follows, worth more than tets that stay stuck
     seconds: dict[str, float] = field(default_factory=dict)
 
     def take(self, problem: VolumeProblem) -> None:
@@ -108,7 +108,7 @@ def solve(
     patience : float
         Share of it that untangling may take.
     hasty : bool
-        Whether to end where many tets are stuck, as other starts follow.
+        Whether to end where tets stay stuck, as other starts follow.
     progress : Progress, optional
     """
     budget = budget or Budget.of(options, problem.solid.n_tets)
@@ -176,7 +176,7 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     """Inverted tets, and tets at folded faces, that are left."""
     history = run.history
     stuck, opened = _untangle_inside(run, glide=glide), None
-    if run.hasty and len(stuck) > _FEW_STUCK:
+    if run.hasty and len(stuck):
         return len(stuck)
     if glide and not len(stuck):
         # A few folded faces are a matter of what is round them; for their sake all the rest would
@@ -243,7 +243,7 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         return stuck
     if run.on_mesh and _freed(run):
         return stuck[:0]
-    if run.hasty and len(stuck) > _FEW_STUCK:
+    if run.hasty:
         return stuck
     before = run.problem
     run.x = untangle_whole(history.model, run.x, history, glide=False, thorough=True).x
@@ -257,7 +257,7 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
 def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
     """Few stuck tets untangled with the edges round them halved, or left as they are."""
     before, left = run.problem, stuck
-    for _ in range(_ROUNDS):
+    for _ in range(_HASTY_ROUNDS if run.hasty else _ROUNDS):
         if before.refinement is None or not 0 < len(left) <= _FEW_STUCK:
             break
         if run.history.budget.spent:

@@ -42,7 +42,7 @@ class Start:
     patience: float = 1.0  # share of the time left that untangling may take
     seconds: float = 0.0  # that the harmonic map took
     others: float = 0.0  # seconds that those took it was compared with
-    hasty: bool = False  # whether it makes room for the next where many tets are stuck
+    hasty: bool = False  # whether it makes room for the next where tets stay stuck
 
     @property
     def inverted(self) -> float:
