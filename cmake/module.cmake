@@ -5,6 +5,9 @@ file(GLOB binding_sources CONFIGURE_DEPENDS cpp/bindings/*.cpp)
 pybind11_add_module(_core NO_EXTRAS ${binding_sources})
 target_link_libraries(_core PRIVATE stretchmap_core)
 target_compile_options(_core PRIVATE ${warnings} ${strict})
+if(MSVC)
+  target_compile_options(_core PRIVATE ${options}) # /bigobj, too, which NO_EXTRAS leaves out
+endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # pybind11's moves of small matrices look uninitialized to it once they are inlined here.
   target_compile_options(_core PRIVATE -Wno-maybe-uninitialized)

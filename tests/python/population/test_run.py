@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -102,7 +101,7 @@ def test_a_run_killed_goes_on_with_the_same_bits(serial, folder, tmp_path):
     while not (tmp_path / "records" / "bone1-0.json").exists():
         assert run.poll() is None
         time.sleep(0.01)
-    run.send_signal(signal.SIGKILL)
+    run.kill()
     run.wait()
     done = sorted(p.name for p in (tmp_path / "records").iterdir())
     assert "bone2-1.json" not in done  # it was not over
@@ -143,7 +142,7 @@ def test_a_dask_cluster_with_a_worker_killed_gives_the_same_bits(serial, folder,
 
         def kill(stage, done, total, **values):
             if not killed:
-                os.kill(pids[0], signal.SIGKILL)
+                os.kill(pids[0], dying.KILL)
                 killed.append(pids[0])
 
         found = sm.population.fit(folder, folder=tmp_path, executor=client, progress=kill, **ROUNDS)
