@@ -41,7 +41,8 @@ _RINGS = (2, 4, 8)  # reach of the patches, to begin with and where that does no
 # Inverted tets: with a larger share of all, it is not a matter of single places.
 _MOST_STUCK = 0.05
 _HELPED = 0.95  # of them are left at most where patches are worth another round
-_HOPELESS = 0.01  # share of the tets for which another start is worth more than patches
+# Shares of the tets for which another start is worth more than patches, and than wide ones.
+_HOPELESS, _WIDELY = 0.01, 0.005
 _FEW_STUCK = 30  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
@@ -279,15 +280,16 @@ def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     while 0 < len(stuck) <= _MOST_STUCK * len(model.T) and not budget.spent:
         x = untangle_patches(model, run.x, stuck, rings=reach, glide=glide, budget=budget)
         left = stuck_tets(model, x, glide=glide)
-        helped = len(left) <= min(_HELPED * len(stuck), len(stuck) - 1)
-        if len(left) < len(stuck):
+        gained = len(left) < len(stuck)
+        helped = gained and len(left) <= _HELPED * len(stuck)
+        if gained:
             run.x, stuck = x, left
         if helped:
             continue
         larger = next(rings, None)
-        if larger is None or (run.hasty and len(stuck) > _FEW_STUCK):
+        if larger is None or (run.hasty and len(stuck) > _WIDELY * len(model.T)):
             break
-        reach = larger
+        reach = larger if gained else next(rings, larger)  # all or nothing
     return stuck
 
 
@@ -335,7 +337,7 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
             first = o.volume_weight if run.problem.warm else goal
             done = minimize(
                 history.model, run.x, history, glide=True, start=first, goal=o.volume_weight,
-                free=free,
+                free=free, asked=None if run.problem.warm else history.model.targets,
             )  # fmt: skip
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
             history.budget = run.budget  # proven as it is: worth all the time there is

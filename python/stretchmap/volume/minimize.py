@@ -2,7 +2,8 @@
 
 With lambda the weight of the volume term and 1 that of the shape term, lambda grows after every
 step that was not cut short to less than half, so shape decides early and volume late. The recorded
-energy is the energy divided by lambda: it cannot rise, neither in a step nor when lambda grows.
+energy is the energy divided by lambda: it cannot rise, neither in a step nor when lambda grows, but
+where other volumes are asked for.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ _CUT, _DOUBT = 1e-2, 5
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
+# Of the logarithms of uneven volumes: what is left after a step of full length, and the mean at
+# which even ones are asked for.
+_LEANER, _EVEN = 0.7, 0.1
 # Energy of a torus map from which on gains are measured against this, and not against itself: a
 # poor map has more to gain, and few steps that gain little tell nothing.
 _FAIR = 5e-3
@@ -72,6 +76,32 @@ class _Sharing:
         self.kept = 0 if renew else (self.kept + 1) % self.shared
 
 
+class _Asked:
+    """Volumes asked of the tets, relative to their shares; in the end even ones.
+
+    Asked for those at once, what a held boundary has squeezed into a hundredth of its volume
+    presses so hard that single elements cut all steps short.
+    """
+
+    def __init__(self, model: SolidModel, first: NDArray[np.float64] | None) -> None:
+        self.volumes = np.ones(len(model.T)) if first is None else first
+        self._model, self._logs = model, np.log(self.volumes)
+        self.even = first is None or self._uneven < _EVEN
+
+    @property
+    def _uneven(self) -> float:
+        return float((self._model.shares * np.abs(self._logs)).sum())
+
+    def follow(self, alpha: float) -> None:
+        """After a step of length ``alpha`` from where these were asked for."""
+        if 0.0 < alpha < _SERVED:
+            return
+        self._logs *= _LEANER if alpha >= 1.0 else math.sqrt(_LEANER)
+        self.even = alpha == 0.0 or self._uneven < _EVEN
+        volumes = np.ones(len(self._logs)) if self.even else np.exp(self._logs)
+        self.volumes = volumes / (self._model.shares * volumes).sum()
+
+
 @dataclass
 class _Standstill:
     """Whether a step shows that there is nothing left to gain.
@@ -108,6 +138,7 @@ def minimize(
     start: float,
     goal: float,
     free: tuple[float, float] = (1.0, 1.0),
+    asked: NDArray[np.float64] | None = None,
 ) -> Minimized:
     """Newton steps with lambda growing from ``start`` to ``goal``; no tet turns over.
 
@@ -124,6 +155,9 @@ def minimize(
     free : (float, float)
         Ratios of volumes, relative to what is asked for, that cost nothing. Before every step each
         tet is asked for the volume between them closest to its own, which lowers the energy.
+    asked : ndarray, shape (k,), optional
+        If ``glide``: volumes relative to the tets' shares that are asked for to begin with. Before
+        lambda grows they become even, a little after each step that was not cut short.
     """
     o = model.options
     stage, total, tolerance, face = (
@@ -134,11 +168,12 @@ def minimize(
     volumes_alone = glide and o.volume_weight >= FillOptions.volume_weight
     fair = _FAIR if volumes_alone else math.inf
     newton = model.newton(x, glide=glide)
-    if not glide:
-        newton.set_targets(model.targets)
+    volumes = _Asked(model, asked if glide else None)
+    goals = volumes.volumes if glide else model.targets
+    if not (glide and volumes.even):
+        newton.set_targets(goals)
     weight, sharing, standstill = start, _Sharing(o.shared), _Standstill()
     relaxation = Relaxation(model) if glide else None
-    asked = goals = np.ones(len(model.T)) if glide else model.targets
     for iteration in range(1, total + 1):
         if history.budget.spent:
             return Minimized(x, False, "the time limit was reached", newton)
@@ -151,6 +186,7 @@ def minimize(
         )
         if free != (1.0, 1.0):
             ratios = _core.mesh.tet_volumes(x, model.T) / _core.mesh.tet_volumes(model.V, model.T)
+            asked = volumes.volumes if glide else model.targets
             goals = asked * np.clip(ratios / asked, *free)
             newton.set_targets(goals)
         x, step = newton.step(x, weights, linear)
@@ -160,6 +196,11 @@ def minimize(
         history.add(
             stage, iteration, x, energy=after, step=step.alpha, residual=step.decrement, total=total
         )
+        if not volumes.even:
+            volumes.follow(step.alpha)
+            goals = volumes.volumes
+            newton.set_targets(goals)
+            continue
         small = standstill.shown(step, weight * tolerance * min(before, fair))
         if weight < goal:
             if step.alpha >= _SERVED:

@@ -20,6 +20,7 @@ from .start import started
 __all__ = ["Optimizer", "run_optimizer"]
 
 _START_TOL = 1e-8
+_ROUNDING = 1e-5  # of float32, a few operations on
 
 
 class Optimizer(Protocol):
@@ -49,7 +50,7 @@ class Optimizer(Protocol):
         Returns
         -------
         array_like, shape (n, 3)
-            Any size will do.
+            In any size, boundary vertices on the torus of that size; rounding to float32 will do.
         """
 
 
@@ -74,10 +75,31 @@ def run_optimizer(problem: VolumeProblem, optimizer: Optimizer, *, solver: str) 
     if found is None:
         raise ArrayError("the optimizer returned None, not an image: end it with 'return image'")
     image = as_reals(found, "what the optimizer returned", (problem.solid.n_vertices, 3))
-    if not float(_core.mesh.tet_volumes(np.ascontiguousarray(image), problem.solid.T).sum()) > 0.0:
+    volume = float(_core.mesh.tet_volumes(np.ascontiguousarray(image), problem.solid.T).sum())
+    if not volume > 0.0:
         raise OrientationError("what the optimizer returned is inside out, or has no volume")
+    size = (volume / problem.solid.volume) ** (1.0 / 3.0)
+    image = _fitted(image, problem.solid.boundary_vertices, torus.scaled(scale), size)
     seconds = {"start": begun - clock, "optimizer": time.perf_counter() - begun}
     return Outcome(
         dataclasses.replace(problem, x=np.ascontiguousarray(image / scale)),
         (), True, "the optimizer returned", seconds,
     )  # fmt: skip
+
+
+def _fitted(
+    image: NDArray[np.float64], rim: NDArray[np.int32], torus: Torus, size: float
+) -> NDArray[np.float64]:
+    """An image of about this size in that of the torus; on it, if only rounding is between."""
+    rho, z = np.hypot(image[rim, 0], image[rim, 1]), image[rim, 2]
+    # The torus k times as large goes through a point for two k: (rho - k R)^2 + z^2 = (k r)^2.
+    outer = torus.R**2 - torus.r**2
+    root = np.sqrt(np.maximum((torus.R * rho) ** 2 - outer * (rho**2 + z**2), 0.0))
+    sizes = (torus.R * rho + np.array([[-1.0], [1.0]]) * root) / outer
+    nearest = np.where(abs(sizes[0] - size) < abs(sizes[1] - size), sizes[0], sizes[1])
+    fitted: NDArray[np.float64] = image / np.median(nearest)
+    u, v, s = torus.coordinates(fitted[rim])
+    if (abs(s / torus.r - 1.0) > _ROUNDING).any():
+        return image
+    fitted[rim] = torus.xi(u, v)
+    return fitted

@@ -25,7 +25,7 @@ def plate(*shape: int) -> sm.TetMesh:
 
 @pytest.fixture(scope="module")
 def solid() -> sm.TetMesh:
-    return plate(8, 8, 2)
+    return plate(10, 3, 3)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import stretchmap as sm
+from stretchmap.samples.solids import cut_cells
+from stretchmap.volume import engine
+from stretchmap.volume import minimize as minimizing
 from stretchmap.volume.minimize import minimize
 from stretchmap.volume.options import FillOptions
 
@@ -45,3 +49,61 @@ def test_a_small_promise_after_a_large_one_that_was_not_kept_is_no_rest(promises
     goal = options.volume_weight
     done = minimize(model, np.zeros((4, 3)), history, glide=False, start=goal, goal=goal)
     assert done.converged and len(kept) == records
+
+
+def asked_of(volumes, alphas):
+    """What is asked of two tets, one seven times as large as the other, before each step."""
+    given = iter(alphas)
+    report = SimpleNamespace(energy=1.0, flips=0, folds=0, min_det=1.0, min_facing=1.0)
+    asked = []
+
+    def step(x, *_):
+        return x, SimpleNamespace(
+            before=report, after=report, alpha=next(given), decrement=1.0, negative_curvature=False
+        )
+
+    newton = SimpleNamespace(set_targets=asked.append, step=step)
+    model = SimpleNamespace(
+        options=FillOptions(glide_iter=len(alphas)),
+        newton=lambda x, glide: newton,
+        shares=np.array([0.125, 0.875]),
+        T=np.zeros((2, 4), np.int32),
+    )
+    history = SimpleNamespace(budget=SimpleNamespace(spent=False), add=lambda *_, **__: None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(minimizing, "Relaxation", lambda _: None)
+        minimize(model, np.zeros((4, 3)), history, glide=True, start=1.0, goal=9.0, asked=volumes)
+    return np.array(asked)
+
+
+def test_what_a_boundary_squeezed_is_asked_to_grow_step_by_step():
+    asked = asked_of(np.array([4.0, 4.0 / 7.0]), [1.0, 0.2, 0.7] + [1.0] * 9)
+    uneven = asked[:, 0] / asked[:, 1]
+    assert uneven[0] == pytest.approx(7.0)
+    assert uneven[2] == uneven[1] < uneven[0]  # after a short step the same is asked for once more
+    assert (np.diff(uneven) <= 0.0).all() and uneven[-1] == 1.0 and len(asked) < 10
+    assert asked @ [0.125, 0.875] == pytest.approx(np.ones(len(asked)))
+
+
+def test_even_volumes_are_asked_for_at_once_where_they_nearly_are():
+    assert len(asked_of(np.array([1.05, 0.99]), [1.0] * 4)) == 0
+    assert len(asked_of(None, [1.0] * 4)) == 0
+    assert (asked_of(np.array([4.0, 4.0 / 7.0]), [0.0, 1.0])[-1] == 1.0).all()  # no step at all
+
+
+def plates() -> list[sm.TetMesh]:
+    """With a hole near one corner; where shapes are kept, what is far from it is tiny."""
+    found = []
+    for n in (7, 8, 9):
+        cells = np.ones((n, 8, 2), bool)
+        cells[1, 1] = False
+        found.append(sm.TetMesh(*cut_cells(cells), orient=True))
+    return found
+
+
+def test_growing_step_by_step_takes_fewer_steps(monkeypatch):
+    monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
+    by_steps = sum(len(sm.volume_map(plate).history) for plate in plates())
+    monkeypatch.setattr(minimizing, "_EVEN", np.inf)
+    at_once = sum(len(sm.volume_map(plate).history) for plate in plates())
+    assert by_steps < 0.85 * at_once

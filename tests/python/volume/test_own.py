@@ -111,3 +111,25 @@ def test_an_image_is_no_start_and_the_error_names_the_way() -> None:
         sm.volume_map(SOLID, start=SOLID.V)
     begun = sm.conformal_map(SOLID.surface)
     assert sm.volume_map(SOLID, start=begun).certificate.certified
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("size", [1.0, 0.25])
+def test_an_image_may_be_of_any_size_and_in_single_precision(size, dtype):
+    def mine(solid, image, torus):
+        return (size * newton(solid, image, torus)).astype(dtype)
+
+    result = sm.volume_map(SOLID, optimizer=mine)
+    assert result.certificate.certified
+    same = sm.volume_map(SOLID, optimizer=newton)
+    assert result.torus.R == pytest.approx(same.torus.R, rel=1e-6)
+    np.testing.assert_allclose(result.image, same.image, atol=1e-5 * same.torus.R)
+
+
+def test_a_boundary_off_the_torus_stays_off():
+    def lifted(solid, image, torus):
+        image[solid.boundary_vertices[0]] *= 1.001
+        return image
+
+    with pytest.raises(CertificationError, match="not on the torus"):
+        sm.volume_map(SOLID, optimizer=lifted)
