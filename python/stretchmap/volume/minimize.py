@@ -84,9 +84,10 @@ class _Asked:
     """
 
     def __init__(self, model: SolidModel, first: NDArray[np.float64] | None) -> None:
-        self.volumes = np.ones(len(model.T)) if first is None else first
-        self._model, self._logs = model, np.log(self.volumes)
+        ones = np.ones(len(model.T))
+        self._model, self._logs = model, np.log(ones if first is None else first)
         self.even = first is None or self._uneven < _EVEN
+        self.volumes = ones if first is None or self.even else first
 
     @property
     def _uneven(self) -> float:
