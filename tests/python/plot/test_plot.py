@@ -268,7 +268,7 @@ def test_opposite_views_see_opposite_sides():
 
 def test_wrong_requests_are_refused(volume, area, tmp_path):
     for result in (volume, area):
-        for unknown in ("portrait", ["levels"], None):
+        for unknown in ("portrait", ["levels"], 3):
             with pytest.raises(OptionError, match="kind must be 'checkerboard'") as refused:
                 result.plot(unknown)
             named = str(refused.value).split(", got")[0]
