@@ -42,6 +42,7 @@ exclude_patterns = [
     "gallery/*.py",
     "tutorials/*.ipynb",
     "tutorials/*.py",
+    "**sg_execution_times.rst",  # linked from nowhere, and asks other servers for its scripts
 ]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3

@@ -47,6 +47,7 @@ def doctor(json: Json = None, quiet: Quiet = False) -> None:
         "BLAS of NumPy": _blas(),
         "processors": os.cpu_count(),
         "threads": _threads(),
+        "OpenMP": "not used: the core has threads of its own",
         **{f"extra {extra}": _installed(packages) for extra, packages in _EXTRAS.items()},
         "self-test": _self_test(),
     }

@@ -22,6 +22,7 @@ def test_doctor_tells_versions_and_maps_a_solid(tmp_path, capsys):
     assert report["stretchmap"] == sm.__version__
     assert report["self-test"].startswith("passed")
     assert int(report["threads"].split()[0]) >= 1
+    assert report["OpenMP"].startswith("not used") and report["BLAS of NumPy"]
     assert "typer" in report["extra cli"] and "scikit-fem" in report["extra fem"]
     assert report["self-test"] in capsys.readouterr().out
 
