@@ -24,6 +24,9 @@ _log = logging.getLogger("stretchmap")
 
 _MINIMIZED = ("frozen", "glide")  # stages whose energies are comparable
 _WORTH_A_START = 0.1  # share of the time; with less left no further one is made
+# Tets stuck at most, and share of the time left, where a start that made room is gone on with
+# before another follows: nearly there, it may take much of the time yet.
+_NEARLY, _LATE = 30, 0.35
 
 
 def certified_map(
@@ -37,7 +40,8 @@ def certified_map(
     """The map from the first start that leads to a certified one, or the best there is.
 
     Where folded faces had to be held for that, the others are tried in the time left. A start in
-    which tets stay stuck makes room for the next one; if none serves, the best is gone on with.
+    which tets stay stuck makes room for the next one; if none serves, or two thirds of the time are
+    spent and few are stuck, the best is gone on with.
 
     Parameters
     ----------
@@ -57,11 +61,17 @@ def certified_map(
     vain, clock = 0.0, time.perf_counter()
     left_off = None  # the best one, where it made room
 
-    def gone_on_with() -> Iterator[Start]:
-        if left_off is not None:
-            yield left_off
+    def in_turn() -> Iterator[Start]:
+        nonlocal left_off
+        for another in itertools.chain(starts, [None]):
+            if another is not None:
+                yield another
+            nearly = 0 < least[1] <= _NEARLY and budget.left < _LATE * budget.seconds
+            if left_off is not None and (another is None or nearly):
+                begin, left_off = left_off, None
+                yield begin
 
-    for begin in itertools.chain(starts, gone_on_with()):
+    for begin in in_turn():
         outcome = solve(
             begin.problem,
             options,

@@ -1,0 +1,79 @@
+"""In which order starts are tried, and when one that made room is gone on with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from stretchmap.volume import certified
+from stretchmap.volume.options import VolumeOptions
+from stretchmap.volume.problem import Outcome
+from stretchmap.volume.ranked_starts import Start
+
+
+@dataclass
+class Found:
+    """What is read of a map: how many tets are inverted."""
+
+    flips: int
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def distortion(self) -> Any:
+        return SimpleNamespace(flips=self.flips)
+
+    @property
+    def certificate(self) -> Any:
+        return SimpleNamespace(certified=self.flips == 0, reason="", checks={})
+
+
+def order(monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int = 0) -> list[str]:
+    """Names of the starts as they are solved, in capitals where none is to make room.
+
+    ``stuck`` says how many tets each leaves inverted in haste, ``kept`` how many if gone on with,
+    ``left`` what share of the time is left after each.
+    """
+    solved: list[str] = []
+    budget = SimpleNamespace(seconds=1.0, left=1.0)
+
+    def starts(*_: Any, **__: Any) -> Any:
+        for name in stuck:
+            problem = SimpleNamespace(name=name, held=())
+            yield Start(SimpleNamespace(), problem, hasty=True)
+
+    def solve(problem: Any, *_: Any, hasty: bool, **__: Any) -> Outcome:
+        solved.append(problem.name if hasty else problem.name.upper())
+        budget.left = left[len(solved) - 1]
+        flips = stuck[problem.name] if hasty else kept
+        return Outcome(problem, (), True, str(flips), {"start": 0.0})
+
+    monkeypatch.setattr(certified.Budget, "of", lambda *_: budget)
+    monkeypatch.setattr(certified, "ranked_starts", starts)
+    monkeypatch.setattr(certified, "solve", solve)
+    monkeypatch.setattr(certified, "volume_result", lambda o, *_: Found(int(o.stop_reason)))
+    solid = SimpleNamespace(n_tets=1000)
+    found = certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
+    assert (found.distortion.flips == 0) == (solved[-1].isupper() and kept == 0)
+    return solved
+
+
+@pytest.mark.parametrize(
+    ("stuck", "left", "kept", "expected"),
+    [
+        # Nobody serves: the best is gone on with.
+        ({"a": 40, "b": 3, "c": 9}, [0.9, 0.8, 0.7, 0.6], 0, "abcB"),
+        # Nearly there, and late: before another start.
+        ({"a": 4, "b": 9, "c": 2}, [0.7, 0.3, 0.2], 0, "abA"),
+        # Late, but far from it: others first.
+        ({"a": 400, "b": 900, "c": 31}, [0.7, 0.3, 0.2, 0.15], 0, "abcC"),
+        # Gone on with in vain, once only: then the others.
+        ({"a": 4, "b": 9, "c": 6}, [0.3, 0.25, 0.2, 0.15], 4, "aAbc"),
+        # No time for any other.
+        ({"a": 4, "b": 9}, [0.05], 0, "a"),
+    ],
+)
+def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, expected) -> None:
+    assert "".join(order(monkeypatch, stuck, left, kept)) == expected
