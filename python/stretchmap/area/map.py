@@ -22,11 +22,13 @@ from ..errors import CertificationError, OptionError, SolverError
 from ..homology.basis import HomologyBasis
 from ..maps.history import IterationRecord
 from ..mesh.given import as_surface, require_same_mesh
+from ..mesh.halved_faces import SurfaceRefinement
 from .coarse import Level, levels
+from .finer import Finer, goal, mapped_finer, too_coarse
 from .finish import Steps, finish_areas, unfolded
-from .flat import unfolded_turns
+from .flat import start_angles, unfolded_turns
 from .result import AreaMap
-from .route import EqualAreas, Finish, Made, Route, follow
+from .route import EqualAreas, Finish, Made, Route, best_turns, follow
 from .search import Ratio
 
 if TYPE_CHECKING:
@@ -40,6 +42,8 @@ _MOST_TURNS = 1e3  # a phase may have
 # Weights of shape in the chart where equal areas leave faces folded: few edges round a branch span
 # so much of the torus then that what lies between two rounds of them is cut off.
 SHAPES = (1.0, 10.0, 100.0, 1e3)
+# Times the goal: where a finer surface has that, the surface itself is not tried, too.
+_FAIR = 3.0
 
 
 @takes_threads
@@ -57,6 +61,7 @@ def area_map(
     shape_budget: float = 1.2,
     balance: float = 1.0,
     sem_iter: int = 10,
+    refine: bool = True,
     keep_best: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -102,6 +107,10 @@ def area_map(
         no matter what ``tol`` is, and rings are left as they come. Not with ``finish="none"``.
     sem_iter : int
         Most steps of stretch energy minimisation.
+    refine : bool
+        Halve edges that span so much of the torus that no flat face beside them can have its area,
+        where the face SD would exceed twice ``tol`` and 0.01; ``mesh`` of the result is then finer
+        than ``surface``. Not with ``finish="none"`` or a ``balance`` below 1.
     keep_best : bool
         Return the map even if it is not certified.
     threads : int, optional
@@ -136,6 +145,11 @@ def area_map(
     A surface of more than 40,000 faces is first mapped with fewer, by removing vertices; a step of
     stretch energy minimisation and a few Newton steps follow on the surface itself.
 
+    A flat face is no thinner than the sag below the arc over its longest edge. Where many edges sag
+    by more than twice the height their faces are to have, all that sag by more than that height are
+    halved in the chart before anything else; where areas stay off, the edges that sag most in
+    faces that are off, three times at most.
+
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
 
@@ -152,16 +166,15 @@ def area_map(
     balance = real("balance", balance, 0.0, 1.0)
     if finish == "none" and balance < 1.0:
         raise OptionError("balance acts in the finishing steps: take finish='ring' or 'face'")
-    keep_best = flag("keep_best", keep_best)
+    keep_best, refine = flag("keep_best", keep_best), flag("refine", refine)
     callback("progress", progress)
     clock = time.perf_counter()
     conformal = _start(surface, basis, conformal, progress)
     seconds = {"conformal": time.perf_counter() - clock}
     wanted = ratio if torus is None else torus.ratio
     steps = Steps(max_iter, tol, shape_budget if balance == 1.0 else math.inf, balance)
-    found = _along(
-        Route(phase, wanted, sem_iter, finish, steps), surface, conformal, progress, torus
-    )
+    route = Route(phase, wanted, sem_iter, finish, steps)
+    found = _found(route, surface, conformal, progress, torus, refine and balance == 1.0)
     if not found.converged:
         _log.warning("area map: %s", found.stop_reason)
     if finish != "none" and not (found.certificate.certified or keep_best):
@@ -173,21 +186,87 @@ def area_map(
     return dataclasses.replace(found, seconds={**seconds, **found.seconds})
 
 
-def _along(
+def _found(
     route: Route,
     surface: TriMesh,
     conformal: ConformalMap,
     progress: Progress | None,
-    torus: Torus | None = None,
+    torus: Torus | None,
+    refine: bool,
 ) -> AreaMap:
-    """The map a route leads to, certified or not; by rising weights of shape while it is folded."""
+    """The map a route leads to, on a finer surface where it takes one, certified or not."""
     equal = equal_areas(surface, conformal, progress)
-    finest = equal.level
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
-    stack = levels(finest)
+    stack, finer = levels(equal.level), None
+    wanted = goal(surface, route.steps.tol)
+    if refine and len(stack) == 1:
+        finer = _finer_at_once(route, equal, progress, torus)
+        if finer is not None and _good(finer, _FAIR * wanted):
+            return finer
+    found = _along(route, stack, equal, conformal, progress, torus)
+    if finer is None and refine and not _folded(found) and not _good(found, wanted):
+        level = Level.of(surface, found.angles / TWO_PI, conformal.forms, conformal.aspect)
+        start = Finer.of(level, found.angles, found.ratio)
+        made = Made(
+            found.angles, found.phase, found.ratio, list(found.history), seconds=dict(found.seconds)
+        )
+        finer = _finer(route, start, made, progress, torus)
+    if finer is None or not finer.certificate.certified:
+        return found
+    if not found.certificate.certified:
+        return finer
+    return min(found, finer, key=lambda each: each.distortion.element_std)
+
+
+def _finer_at_once(
+    route: Route, equal: EqualAreas, progress: Progress | None, torus: Torus | None
+) -> AreaMap | None:
+    """The map of a finer surface, if this one is too coarse for its place in the chart."""
+    clock = time.perf_counter()
+    level = equal.level
+    turns, (phase, ratio, _), records = best_turns(route, equal)
+    angles = start_angles(level.chart, turns, phase, ratio)
+    if not too_coarse(level, angles, ratio):
+        return None
+    finer = Finer.of(level, angles, ratio).fitted()
+    if finer is not None:
+        finer = finer.evened(route.sem_iter, progress).fitted()
+    if finer is None:
+        return None
+    made = Made(angles, phase, ratio, records, seconds={"sem": time.perf_counter() - clock})
+    return _finer(route, finer, made, progress, torus)
+
+
+def _finer(
+    route: Route, start: Finer, made: Made, progress: Progress | None, torus: Torus | None
+) -> AreaMap | None:
+    rings, wanted = route.finish == "ring", goal(start.level.surface, route.steps.tol)
+    found = mapped_finer(start, made, route.steps, wanted, rings, progress)
+    if found is None:
+        return None
+    made, finer = found
+    added = finer.added if finer.added.n_split else None
+    return _result(finer.level.surface, finer.level.forms, made, torus, added)
+
+
+def _good(found: AreaMap, face_std: float) -> bool:
+    return found.certificate.certified and found.distortion.element_std <= face_std
+
+
+def _along(
+    route: Route,
+    stack: list[Level],
+    equal: EqualAreas,
+    conformal: ConformalMap,
+    progress: Progress | None,
+    torus: Torus | None,
+) -> AreaMap:
+    """The map a route leads to, certified or not; by rising weights of shape while it is folded."""
+    finest = equal.level
+    surface, forms = finest.surface, conformal.forms
     made = follow(route, stack, progress, equal if len(stack) == 1 else None)
-    found = _result(surface, conformal, made, torus)
+    found = _result(surface, forms, made, torus)
     for shape in SHAPES:
         if found.certificate.certified or not _folded(found):
             break
@@ -198,7 +277,7 @@ def _along(
             _log.info("%s", error)
             continue
         made.reason = f"faces folded where areas alone counted; {made.reason}"
-        other = _result(surface, conformal, made, torus)
+        other = _result(surface, forms, made, torus)
         if other.certificate.certified or _folded(other) < _folded(found):
             found = other
     return found
@@ -219,7 +298,7 @@ def charted(
 ) -> AreaMap:
     """The unfinished map of a route, as it is in the chart, certified or not."""
     made = follow(route, [equal.level], progress, equal)
-    return _result(equal.level.surface, conformal, made, torus)
+    return _result(equal.level.surface, conformal.forms, made, torus)
 
 
 def _folded(found: AreaMap) -> int:
@@ -228,7 +307,13 @@ def _folded(found: AreaMap) -> int:
     return sum(len(ids.get(check, ())) for check in ("boundary_oriented", "boundary_embedded"))
 
 
-def _result(surface: TriMesh, conformal: ConformalMap, made: Made, torus: Torus | None) -> AreaMap:
+def _result(
+    surface: TriMesh,
+    forms: NDArray[np.int32],
+    made: Made,
+    torus: Torus | None,
+    refinement: SurfaceRefinement | None = None,
+) -> AreaMap:
     clock = time.perf_counter()
     torus = torus or Torus.from_ratio(made.ratio, area=surface.area)
     image = torus.xi(made.angles[:, 0], made.angles[:, 1])
@@ -240,7 +325,8 @@ def _result(surface: TriMesh, conformal: ConformalMap, made: Made, torus: Torus 
         torus=torus,
         phase=made.phase,
         ratio=made.ratio,
-        forms=conformal.forms,
+        forms=forms,
+        refinement=refinement,
         certificate=certificate,
         history=tuple(made.history),
         converged=made.converged,

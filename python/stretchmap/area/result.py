@@ -14,6 +14,7 @@ from ..base.torus import Torus
 from ..certificate.findings import Certificate
 from ..errors import OptionError
 from ..maps.result import MapResult
+from ..mesh.halved_faces import SurfaceRefinement
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
@@ -28,7 +29,8 @@ class AreaMap(MapResult):
     Attributes
     ----------
     mesh : TriMesh
-        The source.
+        The surface that was mapped: the input, or its refinement (see ``refinement``); the first
+        vertices are those of the input.
     angles : ndarray, shape (n, 2)
         Angles (u, v) of the image in radians, not reduced to one turn: ``2 pi forms + d angles`` is
         the change along an edge. They do not depend on the size of the torus.
@@ -42,6 +44,8 @@ class AreaMap(MapResult):
         ``R / r`` of the torus.
     forms : ndarray, shape (2, e), int32
         Integer closed 1-forms of u and v, as in `ConformalMap`.
+    refinement : SurfaceRefinement or None
+        How ``mesh`` came from the input, if it was refined.
     history : tuple of IterationRecord
         One record per iteration: stage ``"coarse"`` where a surface of more than 40,000 faces was
         mapped by way of coarser ones; stage ``"sem"`` measured in the equal-area chart, its energy
@@ -76,17 +80,23 @@ class AreaMap(MapResult):
     phase: float
     ratio: float
     forms: NDArray[np.int32] = field(repr=False)
+    refinement: SurfaceRefinement | None = field(default=None, repr=False)
     certificate: Certificate = field(repr=False)
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
-        """``angles`` (n, 2) and ``forms`` (2, e)."""
-        return {"angles": self.angles, "forms": self.forms}
+        """``angles`` (n, 2), ``forms`` (2, e) and, if the input was refined, ``parent_face`` (m,),
+        the input face of each face."""
+        added = {} if self.refinement is None else {"parent_face": self.refinement.parent_face}
+        return {"angles": self.angles, "forms": self.forms, **added}
 
     def extra_scalars(self) -> dict[str, Any]:
-        """``phase`` and ``ratio``, and what the certificate says."""
+        """``phase`` and ``ratio``, what was added, and what the certificate says."""
+        added = self.refinement
         return {
             "phase": self.phase,
             "ratio": self.ratio,
+            "added_vertices": 0 if added is None else added.n_split,
+            "added_faces": 0 if added is None else added.n_added_faces,
             "certified": self.certificate.certified,
             "certificate": self.certificate.to_dict(),
         }

@@ -101,7 +101,7 @@ def follow(
 
 def _climb(route: Route, stack: list[Level], equal: EqualAreas, progress: Progress | None) -> Made:
     clock = time.perf_counter()
-    turns, found, records = _equal_areas(route, equal)
+    turns, found, records = best_turns(route, equal)
     phase, ratio, _ = found
     middle = time.perf_counter()
     made = Made(start_angles(stack[-1].chart, turns, phase, ratio), phase, ratio, [])
@@ -128,7 +128,7 @@ def _climb(route: Route, stack: list[Level], equal: EqualAreas, progress: Progre
     return made
 
 
-def _equal_areas(
+def best_turns(
     route: Route, equal: EqualAreas
 ) -> tuple[NDArray[np.float64], tuple[float, float, float], list[IterationRecord]]:
     """Turns with nearly equal areas; phase, ratio and energy of their image; records."""

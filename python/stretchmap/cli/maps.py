@@ -70,6 +70,9 @@ def area(
     ] = None,
     ratio: Ratio = None,
     phase: Phase = None,
+    refine: Annotated[
+        bool, typer.Option(help="Halve edges that span too much of the torus for flat faces.")
+    ] = True,
     threads: Threads = None,
     json: Json = None,
     orient: Orient = False,
@@ -98,7 +101,7 @@ def area(
     surface, fields = common.surface_with_fields(mesh, fields)
     watch.lap("read")
     with terminal(quiet) as bar:
-        result = area_map(surface, **options, threads=threads, progress=bar)
+        result = area_map(surface, **options, refine=refine, threads=threads, progress=bar)
     watch.lap(**result.seconds)
     conclude(result.with_fields(*fields), output, json, quiet, watch)
 

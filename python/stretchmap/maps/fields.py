@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArrayError
 from ..io.arrays import checked
+from ..mesh.halved_faces import SurfaceRefinement
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.refinement import Refinement
 
@@ -23,21 +24,21 @@ Fields = dict[str, NDArray[Any]]
 # What map files hold of their own, by name.
 OF_MAPS = frozenset(
     "V F T image angles torus meta target_V target_T ratio ratios ring_ratio ring_ratios file "
-    "parent_tet landmarks forms u v s cos_u sin_u cos_v sin_v grad_u grad_v grad_s along around "
-    "radial seam_u seam_v".split()
+    "parent_tet parent_face landmarks forms u v s cos_u sin_u cos_v sin_v grad_u grad_v grad_s "
+    "along around radial seam_u seam_v".split()
 )
 
 
 def carried(
     mesh: TriMesh | TetMesh,
-    refinement: Refinement | None,
+    refinement: Refinement | SurfaceRefinement | None,
     point_data: Mapping[str, ArrayLike] | None,
     cell_data: Mapping[str, ArrayLike] | None,
 ) -> tuple[Fields, Fields]:
     """Fields of the mesh that was given as fields of the mesh that was mapped.
 
-    A tet has the values of the tet it is a part of, an added vertex the mean of its parents, or,
-    of whole numbers, which may be labels, the value of the first.
+    A tet or face has the values of the one it is a part of, an added vertex the mean of its
+    parents, or, of whole numbers, which may be labels, the value of the first.
 
     Raises
     ------
@@ -48,7 +49,8 @@ def carried(
     n, m = len(mesh.V), len(elements)
     n_given, m_given = n, m
     if refinement is not None:
-        n_given, m_given = n - refinement.n_split, refinement.n_given_tets
+        parent = refinement.parent
+        n_given, m_given = n - refinement.n_split, int(parent.max()) + 1
     points = _own(checked(point_data, _rows(point_data, n, n_given), "point_data"))
     cells = _own(checked(cell_data, _rows(cell_data, m, m_given), "cell_data"))
     if refinement is not None:
@@ -61,7 +63,7 @@ def carried(
             else array[first]
             for name, array in points.items()
         }
-        cells = {k: a if len(a) == m else a[refinement.parent_tet] for k, a in cells.items()}
+        cells = {k: a if len(a) == m else a[parent] for k, a in cells.items()}
     return points, cells
 
 
@@ -84,14 +86,15 @@ def _rows(data: Mapping[str, ArrayLike] | None, own: int, given: int) -> int:
     return own if sizes == {own} else given
 
 
-def _first_parents(refinement: Refinement, n: int) -> NDArray[np.intp]:
+def _first_parents(refinement: Refinement | SurfaceRefinement, n: int) -> NDArray[np.intp]:
     """Vertex of the input each vertex is, or comes from."""
     origin = np.arange(n)
-    for ids, _ in refinement.on_edges:
-        origin = np.concatenate([origin, origin[ids[:, 0]]])
-    origin = np.concatenate(
-        [origin, *(origin[ids[:, 0]] for ids in (refinement.parents, refinement.face_parents))]
-    )
+    if isinstance(refinement, Refinement):
+        for ids, _ in refinement.on_edges:
+            origin = np.concatenate([origin, origin[ids[:, 0]]])
+        origin = np.concatenate(
+            [origin, *(origin[ids[:, 0]] for ids in (refinement.parents, refinement.face_parents))]
+        )
     for ids in refinement.halved:
         origin = np.concatenate([origin, origin[ids[:, 0]]])
     return origin

@@ -139,8 +139,8 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
         ----------
         point_data, cell_data : mapping of str to array_like
             Rows as the input's vertices and elements, or as those of ``mesh``. Where the input was
-            refined, a tet has the values of the tet it is a part of, an added vertex the mean of
-            its parents or, of whole numbers, the value of the first.
+            refined, a tet or face has the values of the one it is a part of, an added vertex the
+            mean of its parents or, of whole numbers, the value of the first.
 
         Raises
         ------
@@ -213,8 +213,8 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
             ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``, ``.xdmf``: the source
             mesh; as point data ``image``, ``ring_ratio`` and, on a torus, ``u``, ``v``, ``s`` with
             ``cos_u``, ``sin_u``, ``cos_v``, ``sin_v``, which have no seam where the angles start
-            anew, and ``torus`` (R and r in every row); as cell data ``ratio``, of a refined solid
-            ``parent_tet``, and of a solid on a torus the gradients and frames of
+            anew, and ``torus`` (R and r in every row); as cell data ``ratio``, of a refined mesh
+            ``parent_tet`` or ``parent_face``, and of a solid on a torus the gradients and frames of
             :meth:`coordinate_field` (``grad_u``, ``grad_v``, ``grad_s``, ``along``, ``around``,
             ``radial``; zero on the core) with ``seam_u`` and ``seam_v``, 1 for tets across which
             the angle jumps; further the fields of the input. :func:`load_map` reads them,

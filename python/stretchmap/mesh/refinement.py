@@ -67,6 +67,11 @@ class Refinement:
     on_edges: tuple[tuple[NDArray[np.int32], NDArray[np.float64]], ...] = ()
 
     @property
+    def parent(self) -> NDArray[np.int32]:
+        """``parent_tet``."""
+        return self.parent_tet
+
+    @property
     def n_split(self) -> int:
         """Number of edges and faces split: the number of added vertices."""
         before = (edges for edges, _ in self.on_edges)

@@ -18,7 +18,7 @@ from ..certificate.findings import require_certified
 from ..errors import KindError, OptionError
 from ..maps.result import MapResult
 from ..mesh.given import as_solid, require_same_mesh
-from ..mesh.meshes import TetMesh
+from ..mesh.meshes import TetMesh, TriMesh
 from .boundary_starts import boundary_starts
 from .certified import certified_map
 from .options import VolumeOptions, balanced, check_call
@@ -230,7 +230,7 @@ def _paper_map(
     if start is None:
         start = area_map(
             solid.surface, ratio=options.ratio or "conformal", phase=options.phase,
-            tol=_BOUNDARY_TOL, keep_best=True, progress=progress,
+            tol=_BOUNDARY_TOL, refine=False, keep_best=True, progress=progress,
         )  # fmt: skip
     problem = _problem(solid, start, None)
     outcome = run_vsem(problem, options, c=c, max_iter=max_iter, progress=progress)
@@ -247,21 +247,25 @@ def _warn(result: VolumeMap) -> None:
 
 
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
-    if isinstance(start.mesh, TetMesh) and _refines(start.mesh, solid):
-        start = dataclasses.replace(start, mesh=solid, image=start.image[: solid.n_vertices])
     mesh = solid if isinstance(start.mesh, TetMesh) else solid.surface
+    if _refines(start.mesh, mesh):
+        return start.image[: mesh.n_vertices], _torus_of(start)
     require_same_mesh(
         mesh,
         start.mesh,
         "start is of another surface or solid",
         "pass a map of the solid or its surface",
     )
+    return start.image, _torus_of(start)
+
+
+def _torus_of(start: MapResult) -> Torus:
     if start.torus is None:
         raise KindError("start must be a map to a torus")
-    return start.image, start.torus
+    return start.torus
 
 
-def _refines(mesh: TetMesh, solid: TetMesh) -> bool:
-    """Whether a mesh begins with the vertices of the solid and has more, as a refinement does."""
-    n = solid.n_vertices
-    return mesh.n_vertices > n and bool((mesh.V[:n] == solid.V).all())
+def _refines(mesh: TetMesh | TriMesh, given: TetMesh | TriMesh) -> bool:
+    """Whether a mesh begins with the vertices of the one given and has more, as a refinement."""
+    n = given.n_vertices
+    return mesh.n_vertices > n and bool((mesh.V[:n] == given.V).all())

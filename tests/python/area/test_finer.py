@@ -1,0 +1,128 @@
+"""Surfaces too coarse for the torus: what is halved, what that brings, what is left alone."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap import TriMesh, _core
+from stretchmap.area.coarse import Level
+from stretchmap.area.finer import Finer, goal, too_coarse
+from stretchmap.base.torus import TWO_PI
+
+
+def small_handle(seed: int, far: float = 3.6) -> TriMesh:
+    """A torus turned inside out about a point close to it: a big body with a small hole."""
+    rng = np.random.default_rng(seed)
+    mesh = sm.samples.torus_surface(40, 28, 2.0, 1.0)
+    away = mesh.V - [far, *rng.uniform(-0.2, 0.2, size=2)]
+    return TriMesh(away / (away**2).sum(axis=1)[:, None], mesh.F, orient=True)
+
+
+def start_of(surface: TriMesh) -> Finer:
+    chart = sm.area_map(surface, finish="none", keep_best=True)
+    level = Level.of(surface, chart.angles / TWO_PI, chart.forms, chart.ratio)
+    return Finer.of(level, np.array(chart.angles), chart.ratio)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_areas_of_small_handles_are_right_once_edges_are_halved(seed: int) -> None:
+    surface = small_handle(seed)
+    plain, finer = sm.area_map(surface, refine=False), sm.area_map(surface)
+    assert plain.refinement is None and plain.distortion.element_std > 0.02
+    assert finer.certificate.certified and finer.distortion.flips == 0
+    assert finer.distortion.element_std <= 0.01
+    added = finer.refinement
+    assert added is not None and added.surface is finer.mesh
+    n = surface.n_vertices
+    assert (finer.mesh.V[:n] == surface.V).all() and finer.image.shape == finer.mesh.V.shape
+    report = finer.to_dict()
+    assert report["added_vertices"] == added.n_split == finer.mesh.n_vertices - n
+    assert report["added_faces"] == added.n_added_faces > 0
+    # Certified anew, from the mesh and the image alone.
+    assert sm.certify(TriMesh(finer.mesh.V, finer.mesh.F), finer.image, finer.torus).certified
+
+
+def test_surfaces_fine_enough_stay_as_they_are() -> None:
+    for surface in (sm.samples.torus_surface(), sm.samples.bumpy_torus(4_000).surface):
+        result = sm.area_map(surface)
+        assert result.refinement is None and len(result.image) == surface.n_vertices
+        assert result.to_dict()["added_faces"] == 0
+
+
+def test_halving_keeps_the_chart() -> None:
+    start = start_of(small_handle(0))
+    surface = start.level.surface
+    marked = np.arange(len(surface.edges)) % 5 == 0
+    finer = start.halved(marked)
+    before, after = (
+        _core.area.turn_areas(each.level.chart, np.ascontiguousarray(each.angles / TWO_PI))
+        for each in (start, finer)
+    )
+    sums = np.bincount(finer.added.parent_face, after, surface.n_faces)
+    assert np.allclose(sums, before, rtol=1e-9, atol=1e-15)
+    assert (finer.angles[: surface.n_vertices] == start.angles).all()
+    # Sums of closed forms along the two angles' loops are whole turns, as they were.
+    assert before.sum() == pytest.approx(after.sum()) == pytest.approx(1.0)
+
+
+def test_what_sags_is_found_and_fitted() -> None:
+    start = start_of(small_handle(0, 4.2))
+    level = start.level
+    assert too_coarse(level, start.angles, start.ratio)
+    fitted = start.fitted()
+    assert fitted is not None and fitted.sags().max() <= 1.0 < start.sags().max()
+    assert 0.0 < fitted.share < 1.0
+    assert start_of(small_handle(0)).fitted() is None  # so many faces are not worth it
+    torus = sm.samples.torus_surface()
+    fine = start_of(torus)
+    assert not too_coarse(fine.level, fine.angles, fine.ratio)
+    # The sag of an edge along the outer equator, over the height of its faces.
+    equator = start_of(sm.samples.torus_surface(30, 20, 3.0, 1.0))
+    turn = TWO_PI / 30
+    ends = equator.level.surface.V[equator.level.surface.edges]
+    outer = (np.abs(ends[:, :, 2]) < 1e-9).all(axis=1) & (np.hypot(*ends.T[:2]) > 3.9).all(axis=0)
+    sag = (equator.ratio + 1.0) * (1.0 - np.cos(turn / 2.0))
+    assert outer.sum() == 30
+    height = sag / equator.sags()[outer]
+    assert np.ptp(height) < 0.1 * height.mean() and 0.2 < height.mean() < 0.45
+
+
+def test_slivers_are_asked_for_less() -> None:
+    surface = sm.samples.torus_surface()
+    assert goal(surface, 5e-3) == pytest.approx(0.01) and goal(surface, 0.02) == pytest.approx(0.04)
+    flat = TriMesh(surface.V * [1.0, 1.0, 50.0], surface.F)
+    assert goal(flat, 5e-3) == pytest.approx(0.03)
+
+
+def test_fields_and_files_of_a_refined_map(tmp_path) -> None:
+    surface = small_handle(0)
+    labels = np.arange(surface.n_faces)
+    result = sm.area_map(surface).with_fields({"x": surface.V[:, 0]}, {"label": labels})
+    assert (result.cell_fields["label"] == result.refinement.parent_face).all()
+    assert np.allclose(result.point_fields["x"], result.mesh.V[:, 0])
+    result.save(tmp_path / "map.npz")
+    loaded = sm.load_map(tmp_path / "map.npz")
+    assert (loaded.arrays["parent_face"] == result.refinement.parent_face).all()
+    assert (loaded.image == result.image).all() and loaded.distortion.flips == 0
+
+
+def test_a_map_of_a_refined_boundary_can_start_a_solid() -> None:
+    solid = sm.samples.bumpy_torus(1_000)
+    start = start_of(solid.surface).halved(np.arange(len(solid.surface.edges)) % 9 == 0)
+    finer = sm.area_map(start.level.surface)
+    assert finer.mesh.n_vertices > solid.surface.n_vertices
+    result = sm.volume_map(solid, start=finer)
+    assert result.certificate.certified
+    moved = TriMesh(finer.mesh.V + 1.0, finer.mesh.F)
+    with pytest.raises(sm.errors.MeshError, match="another surface"):
+        sm.volume_map(solid, start=dataclasses.replace(finer, mesh=moved))
+
+
+def test_refinement_is_the_same_for_any_number_of_threads() -> None:
+    surface = small_handle(1)
+    one, two = (sm.area_map(surface, threads=threads) for threads in (1, 2))
+    assert (one.mesh.F == two.mesh.F).all() and (one.image == two.image).all()

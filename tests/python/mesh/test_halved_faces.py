@@ -1,0 +1,60 @@
+"""Edges of surfaces halved: the same surface, in more pieces, with the way back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from stretchmap.errors import ArrayError
+from stretchmap.mesh.halved_faces import SurfaceRefinement, halve_edges
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 1.0])
+def test_halving_edges_changes_no_point_of_the_surface(share: float) -> None:
+    surface = sm.samples.bumpy_torus(1000).surface
+    rng = np.random.default_rng(3)
+    marked = rng.random(len(surface.edges)) < share
+    done = halve_edges(surface, marked, surface.V)
+    finer = done.surface
+    assert finer.genus == 1 and finer.volume == pytest.approx(surface.volume, rel=1e-13)
+    assert (finer.V[: surface.n_vertices] == surface.V).all()
+    assert (finer.V[surface.n_vertices :] == surface.V[done.edges].mean(axis=1)).all()
+    areas = np.bincount(done.parent, finer.face_areas, surface.n_faces)
+    assert np.allclose(areas, surface.face_areas, rtol=1e-12)
+    halved = {tuple(edge) for edge in done.edges.tolist()}
+    assert {tuple(edge) for edge in surface.edges[marked].tolist()} <= halved
+    assert halved.isdisjoint({tuple(edge) for edge in finer.edges.tolist()})
+    assert (np.diff(done.parent) >= 0).all()
+    a, b, c = np.moveaxis(finer.V[finer.F], 1, 0)
+    p, q, r = np.moveaxis(surface.V[surface.F[done.parent]], 1, 0)
+    turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(q - p, r - p)) <= 0.0
+    assert not turned.any()
+
+
+def test_the_longest_edge_of_a_face_is_halved_with_any_other() -> None:
+    surface = sm.samples.torus_surface(24, 12)
+    lengths = np.linalg.norm(np.diff(surface.V[surface.edges], axis=1)[:, 0], axis=1)
+    marked = np.arange(len(surface.edges)) == lengths.argmin()
+    halved = halve_edges(surface, marked, surface.V).edges
+    assert len(halved) > 1
+    index = {tuple(edge): k for k, edge in enumerate(surface.edges.tolist())}
+    cut = np.zeros(len(surface.edges), bool)
+    cut[[index[tuple(edge)] for edge in halved.tolist()]] = True
+    edge = surface.topology.edge.reshape(-1, 3)
+    longest = edge[np.arange(len(edge)), lengths[edge].argmax(axis=1)]
+    assert cut[longest[cut[edge].any(axis=1)]].all()
+
+
+def test_values_are_carried_over_pass_by_pass() -> None:
+    surface = sm.samples.torus_surface(24, 12)
+    finer = SurfaceRefinement.of(surface)
+    for _ in range(3):
+        marked = np.arange(len(finer.surface.edges)) % 7 == 0
+        finer = finer.after(halve_edges(finer.surface, marked, finer.surface.V))
+    assert len(finer.halved) == 3 and finer.n_added_faces == finer.surface.n_faces - 576
+    assert np.allclose(finer.prolong(surface.V), finer.surface.V, rtol=0, atol=1e-14)
+    areas = np.bincount(finer.parent_face, finer.surface.face_areas)
+    assert np.allclose(areas, surface.face_areas, rtol=1e-12)
+    with pytest.raises(ArrayError, match="288 rows"):
+        finer.prolong(np.zeros(5))
