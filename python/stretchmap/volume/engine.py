@@ -237,6 +237,8 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         return stuck_tets(history.model, run.x, glide=False)
     stuck = _patched(run, glide=False)
     if glide and 0 < len(stuck) <= _FEW_STUCK:
+        stuck = _patched_gliding(run, stuck)
+    if glide and 0 < len(stuck) <= _FEW_STUCK:
         more = run.budget.share(_NEARLY)
         history.budget = more if more.left > history.budget.left else history.budget
         stuck = _untangled_halved(run, stuck)
@@ -265,6 +267,8 @@ def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
             break
         run.take(run.problem.halved(crowded_edges(run.problem.solid, left)))
         left = _patched(run, glide=False)
+        if 0 < len(left) <= _FEW_STUCK:
+            left = _patched_gliding(run, left)
     if not len(left):
         return left
     run.take(before)
@@ -290,6 +294,20 @@ def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         if larger is None or (run.hasty and len(stuck) > _WIDELY * len(model.T)):
             break
         reach = larger if gained else next(rings, larger)  # all or nothing
+    return stuck
+
+
+def _patched_gliding(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Few stuck tets untangled with the boundary round them gliding; inverted tets that are left.
+
+    Where a coarse boundary pins them, no vertex inside has a place from where it sees all of it.
+    """
+    x = run.x
+    _patched(run, glide=True)
+    left = stuck_tets(run.history.model, run.x, glide=False)
+    if len(left) < len(stuck):
+        return left
+    run.x = x
     return stuck
 
 

@@ -143,6 +143,7 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
         return Untangled(x, stuck, -1.0)
 
     monkeypatch.setattr(engine, "_patched", patched)
+    monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: patched(run, glide=False))
     monkeypatch.setattr(engine, "untangle_whole", whole)
     left = engine._untangle_inside(run, glide=True)
     assert len(left) == (0 if cured else stuck)
@@ -181,7 +182,7 @@ def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck
         return Untangled(x, stuck, -1.0)
 
     def patched(run, *, glide):
-        done.append("patches")
+        done.append("gliding" if glide else "patches")
         return np.arange(stuck)
 
     monkeypatch.setattr(engine, "untangle_whole", whole)
@@ -192,12 +193,29 @@ def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck
     monkeypatch.setattr(engine, "crowded_edges", lambda *_: edge)
     monkeypatch.setattr(type(run.problem), "halved", lambda problem, edges: problem)
     assert len(engine._untangle_inside(run, glide=True)) == stuck
-    # Few get more vertices, but not for as long as another start may take.
-    patches = 0 if hopeless else 1 if stuck == 300 else 3
-    assert done == ["whole"] + patches * ["patches"]
+    # Of few the boundary round them may glide, and they get more vertices, but not for as long as
+    # another start may take.
+    patches = [] if hopeless else ["patches"] if stuck == 300 else 3 * ["patches", "gliding"]
+    assert done == ["whole", *patches]
     monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(stuck))
     assert engine._untangle(run, glide=True) == stuck  # nothing else is tried either
-    assert done == ["whole"] + patches * ["patches"]
+    assert done == ["whole", *patches]
+
+
+@pytest.mark.parametrize(("left", "kept"), [(0, True), (1, True), (2, False), (5, False)])
+def test_the_boundary_gives_way_round_few_stuck_tets_if_that_helps(monkeypatch, left, kept):
+    run = run_of(sm.samples.bumpy_torus(600))
+    before = run.x
+
+    def patched(run, *, glide):
+        assert glide
+        run.x = run.x + 1.0
+        return np.arange(left)
+
+    monkeypatch.setattr(engine, "_patched", patched)
+    monkeypatch.setattr(engine, "stuck_tets", lambda *_, glide: np.arange(99 if glide else left))
+    assert len(engine._patched_gliding(run, np.arange(2))) == min(left, 2)
+    assert (run.x is not before) == kept
 
 
 @pytest.mark.parametrize(("left", "rings"), [(200, [2, 8]), (150, [2, 2, 2, 2, 4, 8])])
