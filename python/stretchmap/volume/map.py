@@ -88,7 +88,8 @@ def volume_map(
         Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
     start : MapResult, optional
         Any map to a torus: of ``solid.surface``, to prescribe the boundary, or of ``solid``, or of
-        its refinement, to go on from. What an optimizer of your own returned is one, too.
+        its refinement, to go on from. One of a refined surface is made anew of the surface as it
+        is, on the same torus. What an optimizer of your own returned is one, too.
     optimizer : callable, optional
         ``optimizer(solid, image, torus)`` returns a better image, see `Optimizer`: a method of your
         own in place of ours, from the same start, measured and certified alike.
@@ -178,6 +179,7 @@ def volume_map(
     solid.require_solid_torus()
     if start is not None:
         instance("start", start, MapResult, "a map of this solid; for an image see optimizer")
+        start = _of_the_input(solid, start, progress)
     if method == "vsem":
         return _paper_map(solid, start, options, c or 0.0, max_iter, progress)
     if max_iter is not None:
@@ -246,10 +248,22 @@ def _warn(result: VolumeMap) -> None:
         _log.warning("volume map has %d flipped tets", result.distortion.flips)
 
 
+def _of_the_input(solid: TetMesh, start: MapResult, progress: Progress | None) -> MapResult:
+    """A map of a surface that was refined, made anew of the surface as it is, on the same torus."""
+    if start.torus is None or not (
+        isinstance(start.mesh, TriMesh) and _refines(start.mesh, solid.surface)
+    ):
+        return start
+    ratio, phase = start.torus.ratio, start.to_dict().get("phase")
+    return area_map(
+        solid.surface, ratio=ratio, phase=phase, refine=False, keep_best=True, progress=progress
+    )
+
+
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
+    if isinstance(start.mesh, TetMesh) and _refines(start.mesh, solid):
+        return start.image[: solid.n_vertices], _torus_of(start)
     mesh = solid if isinstance(start.mesh, TetMesh) else solid.surface
-    if _refines(start.mesh, mesh):
-        return start.image[: mesh.n_vertices], _torus_of(start)
     require_same_mesh(
         mesh,
         start.mesh,

@@ -12,6 +12,7 @@ from stretchmap import TriMesh, _core
 from stretchmap.area.coarse import Level
 from stretchmap.area.finer import Finer, goal, too_coarse
 from stretchmap.base.torus import TWO_PI
+from stretchmap.mesh.halved_faces import halve_edges
 
 
 def small_handle(seed: int, far: float = 3.6) -> TriMesh:
@@ -110,13 +111,19 @@ def test_fields_and_files_of_a_refined_map(tmp_path) -> None:
     assert (loaded.image == result.image).all() and loaded.distortion.flips == 0
 
 
-def test_a_map_of_a_refined_boundary_can_start_a_solid() -> None:
+def test_a_map_of_a_refined_boundary_can_start_a_solid(tmp_path) -> None:
+    """It is made anew of the boundary as it is, on the same torus and with the same phase."""
     solid = sm.samples.bumpy_torus(1_000)
-    start = start_of(solid.surface).halved(np.arange(len(solid.surface.edges)) % 9 == 0)
-    finer = sm.area_map(start.level.surface)
+    edges = np.arange(len(solid.surface.edges)) % 9 == 0
+    done = halve_edges(solid.surface, edges, solid.surface.V)
+    finer = sm.area_map(done.surface, ratio=2.5)
     assert finer.mesh.n_vertices > solid.surface.n_vertices
-    result = sm.volume_map(solid, start=finer)
-    assert result.certificate.certified
+    finer.save(tmp_path / "map.npz")
+    for start in (finer, sm.load_map(tmp_path / "map.npz")):
+        result = sm.volume_map(solid, start=start)
+        assert result.certificate.certified and result.boundary_map.phase == finer.phase
+        assert result.boundary_map.ratio == finer.ratio
+        assert result.boundary_map.mesh.n_faces == solid.surface.n_faces
     moved = TriMesh(finer.mesh.V + 1.0, finer.mesh.F)
     with pytest.raises(sm.errors.MeshError, match="another surface"):
         sm.volume_map(solid, start=dataclasses.replace(finer, mesh=moved))
