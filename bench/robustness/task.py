@@ -72,8 +72,10 @@ def map_area(mesh: sm.TetMesh | sm.TriMesh, job: dict[str, Any]) -> tuple[Any, d
     """The default area map of a surface, or of the boundary of a solid."""
     surface = mesh.surface if isinstance(mesh, sm.TetMesh) else mesh
     result = sm.area_map(surface, keep_best=True)
-    proof = sm.certify(surface, result.image, result.torus)
+    proof = sm.certify(result.mesh, result.image, result.torus)
+    added = 0 if result.refinement is None else result.refinement.n_added_faces
     return result, figures.of_ratios(result.distortion.ratios) | {
+        "added_percent": 100.0 * added / surface.n_faces,
         "certified": proof.certified,
         "converged": bool(result.converged),
         "reason": "" if proof.certified else proof.reason,

@@ -35,8 +35,11 @@ _PASSES = 14
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
+_STAGES = ("untangle", "newton")
 _STEPS = 30  # of each round
-_UNFOLDING = 25  # steps at most until no face is folded
+# Steps in all, each counted as if it were one on the surface given: so many, more on small ones; a
+# share of them, and no more than so many, until no face is folded.
+_WORK, _SMALL_WORK, _UNFOLDING = 120.0, 0.8e6, (1 / 6, 25)
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -181,6 +184,10 @@ def mapped_finer(
     clock = time.perf_counter()
     error, best = np.inf, None if finer.added.n_split else (made, finer)
     history, idle = list(made.history), 0
+    work = float(sum(record.stage in _STAGES for record in history))
+    n_given = finer.share * len(finer.added.parent_face)
+    most_work = max(_WORK, _SMALL_WORK / n_given)
+    most_unfolding = min(int(_UNFOLDING[0] * most_work), _UNFOLDING[1])
     for round_ in range(_ROUNDS + 1):
         first = round_ == 0 and finer.added.n_split > 0
         if not first:
@@ -188,17 +195,19 @@ def mapped_finer(
             if marked is None:
                 break
             finer = finer.halved(marked)
+        affordable = int((most_work - work) * finer.share) - most_unfolding
+        if affordable < _STEPS and not first:
+            break
         newton = finer.level.newton(finer.angles, finer.ratio)
-        unfolding = unfold_faces(newton, _UNFOLDING, progress)
+        unfolding = unfold_faces(newton, most_unfolding, progress)
         if not newton.least_facing() > 0.0:
             break
         pace = Pace() if first else Pace(_HEAVY)
-        most = min(
-            max(int(steps.max_iter * finer.share), _STEPS) if first else _STEPS, steps.max_iter
-        )
+        most = min(max(affordable, _STEPS) if first else _STEPS, steps.max_iter)
         records, converged, reason = finish_areas(
             newton, rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
         )
+        work += (len(unfolding) + len(records)) / finer.share
         history += unfolding + records
         finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
         measured = newton.measures()
