@@ -27,7 +27,7 @@ class Probe:
     """
 
     def __init__(self, period=0.005):
-        self.period, self.worst, self.heard = period, 0.0, 0
+        self.period, self.worst, self.heard, self.over = period, 0.0, 0, False
 
     def arm(self):
         self.start = time.thread_time()
@@ -39,7 +39,8 @@ class Probe:
     def hear(self, *_):
         self.note()
         self.heard += 1
-        self.arm()
+        if not self.over:  # a signal on its way out would come when nobody listens any more
+            self.arm()
 
     def __enter__(self):
         self.before = signal.signal(signal.SIGALRM, self.hear)
@@ -47,6 +48,7 @@ class Probe:
         return self
 
     def __exit__(self, *_):
+        self.over = True
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         self.note()
         signal.signal(signal.SIGALRM, self.before)
