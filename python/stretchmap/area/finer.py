@@ -39,7 +39,7 @@ _STAGES = ("untangle", "newton")
 _STEPS = 30  # of each round
 # Steps in all, each counted as if it were one on the surface given: so many, more on small ones; a
 # share of them, and no more than so many, until no face is folded.
-_WORK, _SMALL_WORK, _UNFOLDING = 120.0, 0.8e6, (1 / 6, 25)
+_WORK, _SMALL_WORK, _UNFOLDING = 150.0, 1.0e6, (1 / 6, 25)
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -172,7 +172,7 @@ def mapped_finer(
     finer: Finer,
     made: Made,
     steps: Steps,
-    goal: float,
+    wanted: float,
     rings: bool,
     progress: Progress | None,
 ) -> tuple[Made, Finer] | None:
@@ -217,7 +217,7 @@ def mapped_finer(
             what = Made(newton.angles, made.phase, made.ratio, [], converged, reason)
             error, best = now, (what, finer)
         idle = 0 if now <= _GAIN * before else idle + 1
-        if error <= goal or idle == _IDLE:
+        if error <= wanted or idle == _IDLE:
             break
     if best is None:
         return None

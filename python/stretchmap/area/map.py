@@ -148,8 +148,8 @@ def area_map(
     A flat face is no thinner than the sag below the arc over its longest edge. Where many edges sag
     by more than twice the height their faces are to have, all that sag by more than that height are
     halved in the chart before anything else; where areas stay off, the edges that sag most in
-    faces that are off, three times at most, and only if that takes no more than some 120 steps in
-    all, more on surfaces of less than 6,000 faces.
+    faces that are off, three times at most, and only if that takes no more than some 150 steps in
+    all, more on surfaces of less than 7,000 faces.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
