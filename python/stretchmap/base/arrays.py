@@ -298,3 +298,17 @@ def _check_shape(raw: NDArray[Any], name: str, width: int, what: str) -> None:
         raise ArrayError(expected + hint)
     if len(raw) == 0:
         raise ArrayError(f"{name} is empty, there is no mesh without {what}")
+
+
+def given_rows(values: ArrayLike, n: int) -> NDArray[np.float64]:
+    """Values as floats, one row for each of ``n`` vertices.
+
+    Raises
+    ------
+    ArrayError
+        Another number of rows.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim == 0 or len(array) != n:
+        raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
+    return array

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import read_only
-from ..errors import ArrayError
+from ..base.arrays import given_rows, read_only
 from .surfaces import TriMesh
 
 __all__ = ["HalvedFaces", "SurfaceRefinement", "halve_edges"]
@@ -91,10 +90,7 @@ class SurfaceRefinement:
         ArrayError
             Another number of rows.
         """
-        array = np.asarray(values, dtype=np.float64)
-        n = self.surface.n_vertices - self.n_split
-        if array.ndim == 0 or len(array) != n:
-            raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
+        array = given_rows(values, self.surface.n_vertices - self.n_split)
         for ends in self.halved:
             array = np.concatenate([array, array[ends].mean(axis=1)])
         return array

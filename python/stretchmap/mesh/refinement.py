@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import read_only
-from ..errors import ArrayError
+from ..base.arrays import given_rows, read_only
 from .meshes import TetMesh
 from .split_edges import TET_EDGES, SplitSolid, split_edges
 
@@ -105,10 +104,7 @@ class Refinement:
         ArrayError
             Another number of rows.
         """
-        array = np.asarray(values, dtype=np.float64)
-        n = self.solid.n_vertices - self.n_split
-        if array.ndim == 0 or len(array) != n:
-            raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
+        array = given_rows(values, self.solid.n_vertices - self.n_split)
         for ends, shares in self.on_edges:
             share = shares.reshape(-1, *np.ones(array.ndim - 1, int))
             between = (1.0 - share) * array[ends[:, 0]] + share * array[ends[:, 1]]
