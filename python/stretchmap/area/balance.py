@@ -30,19 +30,19 @@ _SETTLED = 0.02  # share of the energy; a step that lowers it by less was the la
 
 
 def balance_areas(
-    level: Level, shape: float, progress: Progress | None
+    level: Level, shape: float, progress: Progress | None, most: int = _STEPS
 ) -> tuple[NDArray[np.float64], list[IterationRecord]]:
     """Turns (n, 2) with nearly equal area ratios, from the level's; records.
 
     Unless `shape` is zero, the weight of the shape term stays at it, and areas are left as far from
-    equal as that makes them.
+    equal as that makes them. At most ``most`` steps.
     """
     start = time.perf_counter()
     newton = _core.area.ChartNewton(level.chart, level.reference, level.aspect, level.turns)
     history: list[IterationRecord] = []
     lightest = shape or _SHAPE / _MOST_WEIGHT
     shape, reach = shape or _SHAPE, _REACH
-    for iteration in range(1, _STEPS + 1):
+    for iteration in range(1, most + 1):
         taken = newton.step(1.0, shape, reach)
         measured = newton.measures()
         history.append(
@@ -58,7 +58,7 @@ def balance_areas(
                 seconds=time.perf_counter() - start,
             )
         )
-        report(progress, "area", iteration, _STEPS, face_std=measured.face_std)
+        report(progress, "area", iteration, most, face_std=measured.face_std)
         done = taken.before - taken.after < _SETTLED * taken.before
         if taken.step == 0.0 or (taken.within > 1.0 - 1e-9 and (measured.face_std < _FAIR or done)):
             break

@@ -24,6 +24,7 @@ from .finish import Pace, Steps, finish_areas, unfold_faces
 from .flat import start_angles
 from .route import Made
 from .sem import minimize_stretch
+from .work import Work
 
 _log = logging.getLogger("stretchmap")
 
@@ -35,11 +36,8 @@ _PASSES = 14
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
-_STAGES = ("untangle", "newton")
-_STEPS = 30  # of each round
-# Steps in all, each counted as if it were one on the surface given: so many, more on small ones; a
-# share of them, and no more than so many, until no face is folded.
-_WORK, _SMALL_WORK, _UNFOLDING = 150.0, 1.0e6, (1 / 6, 25)
+_STEPS = 30  # of each round; fewer are not worth it
+_UNFOLDING = (1 / 4, (5, 25))  # a share of the work, and steps, until no face is folded
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -175,6 +173,7 @@ def mapped_finer(
     wanted: float,
     rings: bool,
     progress: Progress | None,
+    work: Work,
 ) -> tuple[Made, Finer] | None:
     """Newton steps, then more edges halved where areas are off; the best of all, records added.
 
@@ -184,10 +183,7 @@ def mapped_finer(
     clock = time.perf_counter()
     error, best = np.inf, None if finer.added.n_split else (made, finer)
     history, idle = list(made.history), 0
-    work = float(sum(record.stage in _STAGES for record in history))
-    n_given = finer.share * len(finer.added.parent_face)
-    most_work = max(_WORK, _SMALL_WORK / n_given)
-    most_unfolding = min(int(_UNFOLDING[0] * most_work), _UNFOLDING[1])
+    most_unfolding = int(np.clip(_UNFOLDING[0] * work.left, *_UNFOLDING[1]))
     for round_ in range(_ROUNDS + 1):
         first = round_ == 0 and finer.added.n_split > 0
         if not first:
@@ -195,19 +191,21 @@ def mapped_finer(
             if marked is None:
                 break
             finer = finer.halved(marked)
-        affordable = int((most_work - work) * finer.share) - most_unfolding
-        if affordable < _STEPS and not first:
-            break
+        n_faces = finer.level.surface.n_faces
         newton = finer.level.newton(finer.angles, finer.ratio)
+        folded = not newton.least_facing() > 0.0
+        if work.steps(n_faces) - folded * most_unfolding < _STEPS:
+            break
         unfolding = unfold_faces(newton, most_unfolding, progress)
+        work.spend(len(unfolding), n_faces)
         if not newton.least_facing() > 0.0:
             break
         pace = Pace() if first else Pace(_HEAVY)
-        most = min(max(affordable, _STEPS) if first else _STEPS, steps.max_iter)
+        most = min(work.steps(n_faces) if first else _STEPS, steps.max_iter)
         records, converged, reason = finish_areas(
             newton, rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
         )
-        work += (len(unfolding) + len(records)) / finer.share
+        work.spend(len(records), n_faces)
         history += unfolding + records
         finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
         measured = newton.measures()

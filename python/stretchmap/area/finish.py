@@ -34,7 +34,8 @@ _MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings
 _FAIR = 2.0  # from this face SD on, in units of tol, the shape budget counts
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 
-_UNFOLD_STEPS = 100
+# Where others follow that keep shapes more, steps beyond the first are better spent there.
+UNFOLD_STEPS, FEW_UNFOLD_STEPS = 100, 40
 # Where faces that keep what they have could be unfolded at all, it took up to 24.
 _KEEPING_STEPS = 30
 _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing any more
@@ -49,6 +50,7 @@ def unfolded(
     progress: Progress | None,
     *,
     keep: bool = False,
+    most: int = UNFOLD_STEPS,
 ) -> tuple[_core.area.SurfaceNewton, list[IterationRecord]]:
     """What goes on from there, every face looking outward if steps lead there; records.
 
@@ -59,7 +61,7 @@ def unfolded(
     newton = level.newton(angles, ratio)
     if newton.least_facing() > 0.0:
         return newton, []
-    tried = [] if keep else unfold_faces(newton, _UNFOLD_STEPS, progress)
+    tried = [] if keep else unfold_faces(newton, most, progress)
     if newton.least_facing() > 0.0:
         return newton, tried
     try:

@@ -29,7 +29,8 @@ from .finish import Steps, finish_areas, unfolded
 from .flat import start_angles, unfolded_turns
 from .result import AreaMap
 from .route import EqualAreas, Finish, Made, Route, best_turns, follow
-from .search import Ratio
+from .search import Ratio, search_phase
+from .work import Work
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
@@ -42,8 +43,8 @@ _MOST_TURNS = 1e3  # a phase may have
 # Weights of shape in the chart where equal areas leave faces folded: few edges round a branch span
 # so much of the torus then that what lies between two rounds of them is cut off.
 SHAPES = (1.0, 10.0, 100.0, 1e3)
-# Times the goal: where a finer surface has that, the surface itself is not tried, too.
-_FAIR = 3.0
+# The same where that takes too many faces of a finer surface.
+_EASED = (0.3, 1.0)
 
 
 @takes_threads
@@ -148,8 +149,9 @@ def area_map(
     A flat face is no thinner than the sag below the arc over its longest edge. Where many edges sag
     by more than twice the height their faces are to have, all that sag by more than that height are
     halved in the chart before anything else; where areas stay off, the edges that sag most in
-    faces that are off, three times at most, and only if that takes no more than some 150 steps in
-    all, more on surfaces of less than 7,000 faces.
+    faces that are off, three times at most. Where that takes too many faces or leaves some folded,
+    the chart is eased first: its areas are left off for the sake of shapes. All steps together cost
+    no more than some 135 on the surface itself, more on one of less than 5,500 faces.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
@@ -199,20 +201,20 @@ def _found(
     equal = equal_areas(surface, conformal, progress)
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
-    stack, finer = levels(equal.level), None
+    stack, finer, work = levels(equal.level), None, Work.of(surface)
     wanted = goal(surface, route.steps.tol)
     if refine and len(stack) == 1:
-        finer = _finer_at_once(route, equal, progress, torus)
-        if finer is not None and _good(finer, _FAIR * wanted):
+        finer = _finer_at_once(route, equal, progress, torus, work)
+        if finer is not None and finer.certificate.certified:
             return finer
-    found = _along(route, stack, equal, conformal, progress, torus)
+    found = _along(route, stack, equal, conformal, progress, torus, work)
     if finer is None and refine and not _folded(found) and not _good(found, wanted):
         level = Level.of(surface, found.angles / TWO_PI, conformal.forms, conformal.aspect)
         start = Finer.of(level, found.angles, found.ratio)
         made = Made(
             found.angles, found.phase, found.ratio, list(found.history), seconds=dict(found.seconds)
         )
-        finer = _finer(route, start, made, progress, torus)
+        finer = _finer(route, start, made, progress, torus, work)
     if finer is None or not finer.certificate.certified:
         return found
     if not found.certificate.certified:
@@ -221,29 +223,49 @@ def _found(
 
 
 def _finer_at_once(
-    route: Route, equal: EqualAreas, progress: Progress | None, torus: Torus | None
+    route: Route, equal: EqualAreas, progress: Progress | None, torus: Torus | None, work: Work
 ) -> AreaMap | None:
-    """The map of a finer surface, if this one is too coarse for its place in the chart."""
+    """The map of a finer surface, if this one is too coarse for its place in the chart.
+
+    Where that takes too many faces or leaves some folded, from charts that keep shapes more.
+    """
     clock = time.perf_counter()
     level = equal.level
     turns, (phase, ratio, _), records = best_turns(route, equal)
+    work.spend_in_chart(sum(record.stage == "balance" for record in records))
     angles = start_angles(level.chart, turns, phase, ratio)
     if not too_coarse(level, angles, ratio):
         return None
-    finer = Finer.of(level, angles, ratio).fitted()
-    if finer is not None:
-        finer = finer.evened(route.sem_iter, progress).fitted()
-    if finer is None:
-        return None
-    made = Made(angles, phase, ratio, records, seconds={"sem": time.perf_counter() - clock})
-    return _finer(route, finer, made, progress, torus)
+    for shape in (0.0, *_EASED):
+        if shape:
+            turns, more = equal.eased(shape, turns)
+            records = records + more
+            work.spend_in_chart(len(more))
+            given = (route.phase, route.ratio)
+            phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
+            angles = start_angles(level.chart, turns, phase, ratio)
+        finer = Finer.of(level, angles, ratio).fitted()
+        if finer is not None and not shape:
+            finer = finer.evened(route.sem_iter, progress).fitted()
+        if finer is not None:
+            seconds = {"sem": time.perf_counter() - clock}
+            made = Made(angles, phase, ratio, records, seconds=seconds)
+            found = _finer(route, finer, made, progress, torus, work)
+            if found is not None:
+                return found
+    return None
 
 
 def _finer(
-    route: Route, start: Finer, made: Made, progress: Progress | None, torus: Torus | None
+    route: Route,
+    start: Finer,
+    made: Made,
+    progress: Progress | None,
+    torus: Torus | None,
+    work: Work,
 ) -> AreaMap | None:
     rings, wanted = route.finish == "ring", goal(start.level.surface, route.steps.tol)
-    found = mapped_finer(start, made, route.steps, wanted, rings, progress)
+    found = mapped_finer(start, made, route.steps, wanted, rings, progress, work)
     if found is None:
         return None
     made, finer = found
@@ -262,18 +284,20 @@ def _along(
     conformal: ConformalMap,
     progress: Progress | None,
     torus: Torus | None,
+    work: Work,
 ) -> AreaMap:
     """The map a route leads to, certified or not; by rising weights of shape while it is folded."""
     finest = equal.level
     surface, forms = finest.surface, conformal.forms
-    made = follow(route, stack, progress, equal if len(stack) == 1 else None)
+    made = follow(route, stack, progress, equal if len(stack) == 1 else None, work)
     found = _result(surface, forms, made, torus)
     for shape in SHAPES:
         if found.certificate.certified or not _folded(found):
-            break
+            return found
         _log.info("%s: once more with weight %g of shape", found.certificate.reason, shape)
+        along = dataclasses.replace(route, shape=shape)
         try:
-            made = follow(dataclasses.replace(route, shape=shape), [finest], progress, equal)
+            made = follow(along, [finest], progress, equal, work)
         except SolverError as error:  # sizes of faces are lost in rounding; what there is, stands
             _log.info("%s", error)
             continue
@@ -281,7 +305,14 @@ def _along(
         other = _result(surface, forms, made, torus)
         if other.certificate.certified or _folded(other) < _folded(found):
             found = other
-    return found
+    if found.certificate.certified or not _folded(found):
+        return found
+    clock = time.perf_counter()
+    newton = finest.newton(found.angles, found.ratio)
+    limited = dataclasses.replace(route.steps, max_iter=min(route.steps.max_iter, work.steps()))
+    records, _, reason = finish_areas(newton, False, limited, progress)
+    found = _moved(found, newton.angles, records, clock)
+    return dataclasses.replace(found, converged=False, stop_reason=reason)
 
 
 def equal_areas(surface: TriMesh, conformal: ConformalMap, progress: Progress | None) -> EqualAreas:

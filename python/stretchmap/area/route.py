@@ -15,12 +15,16 @@ from ..base.progress import Progress
 from ..maps.history import IterationRecord
 from .balance import JAMMED, balance_areas
 from .coarse import Folded, Level
-from .finish import Pace, Steps, finish_areas, unfolded
+from .finish import FEW_UNFOLD_STEPS, UNFOLD_STEPS, Pace, Steps, finish_areas, unfolded
 from .flat import start_angles
 from .search import Ratio, search_phase
 from .sem import minimize_stretch
+from .work import Work
 
 _log = logging.getLogger("stretchmap")
+
+_LEAST_STEPS = 20  # areas get, however little work is left
+_EASING = 25  # steps towards shapes from where areas are equal
 
 Finish = Literal["ring", "face", "none"]
 _Turns = tuple[NDArray[np.float64], list[IterationRecord]]
@@ -83,23 +87,39 @@ class EqualAreas:
             self._balanced[shape] = balance_areas(self.level, shape, self._progress)
         return self._balanced[shape]
 
+    def eased(self, shape: float, turns: NDArray[np.float64]) -> _Turns:
+        """Others moved on by Newton steps with that weight of shape; with records."""
+        level = dataclasses.replace(self.level, turns=turns)
+        return balance_areas(level, shape, self._progress, most=_EASING)
+
 
 def follow(
-    route: Route, stack: list[Level], progress: Progress | None, equal: EqualAreas | None = None
+    route: Route,
+    stack: list[Level],
+    progress: Progress | None,
+    equal: EqualAreas | None = None,
+    work: Work | None = None,
 ) -> Made:
     """Angles of the first level: by way of the last, or without if they fold on the way up.
 
-    ``equal`` is that of the last level, if there is one already.
+    ``equal`` is that of the last level, if there is one already. With ``work``, steps are counted
+    there and bounded by it, and what stays folded is not finished.
     """
     try:
-        return _climb(route, stack, equal or EqualAreas(stack[-1], progress), progress)
+        return _climb(route, stack, equal or EqualAreas(stack[-1], progress), progress, work)
     except Folded:
         _log.info("a coarser surface's map folds faces of this one: mapped without it")
         finest = dataclasses.replace(stack[0], coarse=None)
-        return _climb(route, [finest], EqualAreas(finest, progress), progress)
+        return _climb(route, [finest], EqualAreas(finest, progress), progress, work)
 
 
-def _climb(route: Route, stack: list[Level], equal: EqualAreas, progress: Progress | None) -> Made:
+def _climb(
+    route: Route,
+    stack: list[Level],
+    equal: EqualAreas,
+    progress: Progress | None,
+    work: Work | None,
+) -> Made:
     clock = time.perf_counter()
     turns, found, records = best_turns(route, equal)
     phase, ratio, _ = found
@@ -117,13 +137,26 @@ def _climb(route: Route, stack: list[Level], equal: EqualAreas, progress: Progre
         if level.coarse is not None:
             made.angles = level.prolonged(made.angles, ratio)
             pace = pace.finer()
-        newton, unfolding = unfolded(level, made.angles, ratio, progress, keep=route.shape > 0.0)
+        bounded = work if finest else None
+        most = UNFOLD_STEPS if bounded is None else FEW_UNFOLD_STEPS
+        newton, unfolding = unfolded(
+            level, made.angles, ratio, progress, keep=route.shape > 0.0, most=most
+        )
         made.add(unfolding, finest)
+        if bounded is not None:
+            bounded.spend(len(unfolding))
+            if not newton.least_facing() > 0.0:
+                made.angles, made.converged, made.reason = newton.angles, False, "faces stay folded"
+                break
+            affordable = max(bounded.steps(), _LEAST_STEPS)
+            steps = dataclasses.replace(steps, max_iter=min(steps.max_iter, affordable))
         records, made.converged, made.reason = finish_areas(
             newton, finest and route.finish == "ring", steps, progress, pace
         )
         made.add(records, finest)
         made.angles = newton.angles
+        if bounded is not None:
+            bounded.spend(len(records))
     made.seconds["finish"] = time.perf_counter() - clock
     return made
 

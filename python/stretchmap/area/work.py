@@ -1,0 +1,43 @@
+"""How much work a map may take: Newton steps, each counted as one on the surface given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..mesh.surfaces import TriMesh
+
+_STEPS, _SMALL = 135.0, 7.5e5  # so many, or as many as make so many faces on a small surface
+_CHART = 0.4  # of a step: what one in the flat chart takes
+
+
+@dataclass
+class Work:
+    """What is left of it.
+
+    Attributes
+    ----------
+    n_faces : int
+        Of the surface given.
+    left : float
+    """
+
+    n_faces: int
+    left: float
+
+    @classmethod
+    def of(cls, surface: TriMesh) -> Work:
+        """All of it."""
+        n_faces = surface.n_faces
+        return cls(n_faces, max(_STEPS, _SMALL / n_faces))
+
+    def spend(self, steps: int, n_faces: int | None = None) -> None:
+        """Newton steps on a surface of so many faces."""
+        self.left -= steps * (n_faces or self.n_faces) / self.n_faces
+
+    def spend_in_chart(self, steps: int) -> None:
+        """Newton steps in the flat chart of the surface given."""
+        self.left -= _CHART * steps
+
+    def steps(self, n_faces: int | None = None) -> int:
+        """Newton steps that can be afforded on a surface of so many faces."""
+        return max(int(self.left * self.n_faces / (n_faces or self.n_faces)), 0)
