@@ -137,8 +137,12 @@ class Finer:
             level, start_angles(level.chart, turns, 0.0, self.ratio), self.ratio, self.added
         )
 
-    def where_off(self, tol: float) -> NDArray[np.bool_] | None:
-        """(e,) the edges that sag most in faces whose areas are off; None if there are none."""
+    def newton(self) -> _core.area.SurfaceNewton:
+        """Steps from here on."""
+        return self.level.newton(self.angles, self.ratio)
+
+    def where_off(self, tol: float) -> Finer | None:
+        """With the edges halved that sag most in faces whose areas are off; None without any."""
         surface = self.level.surface
         edge = surface.topology.edge.reshape(-1, 3)
         a, b, c = np.moveaxis(self.image[surface.F], 1, 0)
@@ -148,7 +152,7 @@ class Finer:
         worst = own[np.arange(len(own)), sags[own].argmax(axis=1)]
         marked = np.zeros(len(sags), bool)
         marked[worst[sags[worst] > _LITTLE]] = True
-        return marked if marked.any() and not self.too_many(marked) else None
+        return self.halved(marked) if marked.any() and not self.too_many(marked) else None
 
     @property
     def share(self) -> float:
@@ -184,29 +188,38 @@ def mapped_finer(
     error, best = np.inf, None if finer.added.n_split else (made, finer)
     history, idle = list(made.history), 0
     most_unfolding = int(np.clip(_UNFOLDING[0] * work.left, *_UNFOLDING[1]))
-    for round_ in range(_ROUNDS + 1):
-        first = round_ == 0 and finer.added.n_split > 0
-        if not first:
-            marked = finer.where_off(steps.tol)
-            if marked is None:
-                break
-            finer = finer.halved(marked)
-        n_faces = finer.level.surface.n_faces
-        newton = finer.level.newton(finer.angles, finer.ratio)
+
+    def begun(finer: Finer) -> _core.area.SurfaceNewton | None:
+        """Steps from there on, if they can be afforded and lead to no folded face."""
+        newton, n_faces = finer.newton(), finer.level.surface.n_faces
         folded = not newton.least_facing() > 0.0
         if work.steps(n_faces) - folded * most_unfolding < _STEPS:
-            break
+            return None
         unfolding = unfold_faces(newton, most_unfolding, progress)
         work.spend(len(unfolding), n_faces)
-        if not newton.least_facing() > 0.0:
+        history.extend(unfolding)
+        return newton if newton.least_facing() > 0.0 else None
+
+    for round_ in range(_ROUNDS + 1):
+        at_once = round_ == 0 and finer.added.n_split > 0
+        last = at_once
+        halved = finer if at_once else finer.where_off(steps.tol)
+        newton = None if halved is None else begun(halved)
+        if newton is not None:
+            assert halved is not None
+            finer = halved
+        elif round_ == 0 and not at_once:  # no edge to halve: the steps left go on here
+            newton, last = finer.newton(), True
+        else:
             break
-        pace = Pace() if first else Pace(_HEAVY)
-        most = min(work.steps(n_faces) if first else _STEPS, steps.max_iter)
+        n_faces = finer.level.surface.n_faces
+        pace = Pace() if at_once else Pace(_HEAVY)
+        most = min(work.steps(n_faces) if last else _STEPS, steps.max_iter)
         records, converged, reason = finish_areas(
             newton, rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
         )
         work.spend(len(records), n_faces)
-        history += unfolding + records
+        history += records
         finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
         measured = newton.measures()
         _log.info("%d edges halved: face SD %.2e", finer.added.n_split, measured.face_std)

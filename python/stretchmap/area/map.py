@@ -201,7 +201,8 @@ def _found(
     equal = equal_areas(surface, conformal, progress)
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
-    stack, finer, work = levels(equal.level), None, Work.of(surface)
+    stack, finer = levels(equal.level), None
+    work = Work.of(surface, refine=refine and len(stack) == 1)
     wanted = goal(surface, route.steps.tol)
     if refine and len(stack) == 1:
         finer = _finer_at_once(route, equal, progress, torus, work)

@@ -148,7 +148,7 @@ def _climb(
             if not newton.least_facing() > 0.0:
                 made.angles, made.converged, made.reason = newton.angles, False, "faces stay folded"
                 break
-            affordable = max(bounded.steps(), _LEAST_STEPS)
+            affordable = min(max(bounded.steps(), _LEAST_STEPS), bounded.most)
             steps = dataclasses.replace(steps, max_iter=min(steps.max_iter, affordable))
         records, made.converged, made.reason = finish_areas(
             newton, finest and route.finish == "ring", steps, progress, pace

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..mesh.surfaces import TriMesh
 
 _STEPS, _SMALL = 135.0, 7.5e5  # so many, or as many as make so many faces on a small surface
+_UNREFINED = 40  # steps where edges can be halved after them
 _CHART = 0.4  # of a step: what one in the flat chart takes
 
 
@@ -19,16 +20,20 @@ class Work:
     n_faces : int
         Of the surface given.
     left : float
+    most : int
+        Steps on a surface before edges are halved where they end short.
     """
 
     n_faces: int
     left: float
+    most: int
 
     @classmethod
-    def of(cls, surface: TriMesh) -> Work:
+    def of(cls, surface: TriMesh, *, refine: bool) -> Work:
         """All of it."""
         n_faces = surface.n_faces
-        return cls(n_faces, max(_STEPS, _SMALL / n_faces))
+        left = max(_STEPS, _SMALL / n_faces)
+        return cls(n_faces, left, _UNREFINED if refine else int(left))
 
     def spend(self, steps: int, n_faces: int | None = None) -> None:
         """Newton steps on a surface of so many faces."""
