@@ -219,6 +219,8 @@ def mapped_finer(
             newton, rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
         )
         work.spend(len(records), n_faces)
+        if rings:
+            work.spend_on_rings(n_faces)
         history += records
         finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
         measured = newton.measures()

@@ -151,7 +151,7 @@ def area_map(
     halved in the chart before anything else; where areas stay off, the edges that sag most in
     faces that are off, three times at most. Where that takes too many faces or leaves some folded,
     the chart is eased first: its areas are left off for the sake of shapes. All steps together cost
-    no more than some 135 on the surface itself, more on one of less than 5,500 faces.
+    no more than some 115 on the surface itself, more on one of less than 5,700 faces.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
@@ -245,6 +245,7 @@ def _finer_at_once(
             given = (route.phase, route.ratio)
             phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
             angles = start_angles(level.chart, turns, phase, ratio)
+        work.spend_on_fitting()
         finer = Finer.of(level, angles, ratio).fitted()
         if finer is not None and not shape:
             finer = finer.evened(route.sem_iter, progress).fitted()

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 from ..mesh.surfaces import TriMesh
 
-_STEPS, _SMALL = 135.0, 7.5e5  # so many, or as many as make so many faces on a small surface
+_STEPS, _SMALL = 115.0, 6.5e5  # so many, or as many as make so many faces on a small surface
 _UNREFINED = 40  # steps where edges can be halved after them
-_CHART = 0.4  # of a step: what one in the flat chart takes
+# Steps that others take as long as: one in the flat chart, halving edges until few sag, and rings
+# made exact.
+_CHART, _FITTING, _RINGS = 0.4, 4.0, 5.0
 
 
 @dataclass
@@ -42,6 +44,14 @@ class Work:
     def spend_in_chart(self, steps: int) -> None:
         """Newton steps in the flat chart of the surface given."""
         self.left -= _CHART * steps
+
+    def spend_on_fitting(self) -> None:
+        """Edges of the surface given halved until none sags too much."""
+        self.left -= _FITTING
+
+    def spend_on_rings(self, n_faces: int) -> None:
+        """The projection of the rings of a surface of so many faces."""
+        self.left -= _RINGS * n_faces / self.n_faces
 
     def steps(self, n_faces: int | None = None) -> int:
         """Newton steps that can be afforded on a surface of so many faces."""
