@@ -151,7 +151,7 @@ def area_map(
     halved in the chart before anything else; where areas stay off, the edges that sag most in
     faces that are off, three times at most. Where that takes too many faces or leaves some folded,
     the chart is eased first: its areas are left off for the sake of shapes. All steps together cost
-    no more than some 115 on the surface itself, more on one of less than 5,700 faces.
+    no more than some 130 on the surface itself, more on one of less than 5,400 faces.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
