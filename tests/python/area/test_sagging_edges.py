@@ -11,6 +11,7 @@ import stretchmap as sm
 from stretchmap import TriMesh, _core
 from stretchmap.area.coarse import Level
 from stretchmap.area.finer import Finer, goal, too_coarse
+from stretchmap.area.work import Work
 from stretchmap.base.torus import TWO_PI
 from stretchmap.mesh.halved_faces import halve_edges
 
@@ -90,6 +91,30 @@ def test_what_sags_is_found_and_fitted() -> None:
     assert outer.sum() == 30
     height = sag / equator.sags()[outer]
     assert np.ptp(height) < 0.1 * height.mean() and 0.2 < height.mean() < 0.45
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_charts_are_eased_where_halving_takes_too_many_faces(seed: int) -> None:
+    surface = small_handle(seed)
+    assert start_of(surface).fitted() is None
+    plain, eased = sm.area_map(surface, refine=False), sm.area_map(surface)
+    assert eased.certificate.certified and eased.refinement is not None
+    assert eased.distortion.element_std < plain.distortion.element_std / 3.0
+    assert not eased.converged and "face SD" in eased.stop_reason
+
+
+def test_steps_are_counted_by_their_faces() -> None:
+    surface = sm.samples.torus_surface(100, 80)
+    work = Work.of(surface, refine=True)
+    assert (work.n_faces, work.left, work.most) == (16_000, 130.0, 40)
+    work.spend(10)
+    work.spend(10, 32_000)
+    assert work.left == 100.0 and work.steps() == 100 and work.steps(64_000) == 25
+    work.spend_in_chart(100)
+    assert work.left == pytest.approx(60.0)
+    work.spend(200)
+    assert work.steps() == 0
+    assert Work.of(sm.samples.torus_surface(), refine=False).left > 130.0
 
 
 def test_slivers_are_asked_for_less() -> None:
