@@ -20,7 +20,7 @@ from ..base.torus import TWO_PI, Torus
 from ..mesh.halved_faces import SurfaceRefinement, halve_edges
 from ..mesh.surfaces import TriMesh
 from .coarse import Level, forms_of
-from .finish import Pace, Steps, finish_areas, unfold_faces
+from .finish import Pace, Steps, cut_short, finish_areas, unfold_faces
 from .flat import start_angles
 from .route import Made
 from .sem import minimize_stretch
@@ -141,13 +141,18 @@ class Finer:
         """Steps from here on."""
         return self.level.newton(self.angles, self.ratio)
 
+    def ratios(self) -> NDArray[np.float64]:
+        """(m,) area ratios of the faces, 1 on average."""
+        a, b, c = np.moveaxis(self.image[self.level.surface.F], 1, 0)
+        ratios = np.linalg.norm(np.cross(b - a, c - a), axis=1) / self.level.surface.face_areas
+        found: NDArray[np.float64] = ratios / ratios.mean()
+        return found
+
     def where_off(self, tol: float) -> Finer | None:
         """With the edges halved that sag most in faces whose areas are off; None without any."""
         surface = self.level.surface
         edge = surface.topology.edge.reshape(-1, 3)
-        a, b, c = np.moveaxis(self.image[surface.F], 1, 0)
-        ratios = np.linalg.norm(np.cross(b - a, c - a), axis=1) / surface.face_areas
-        own = edge[np.abs(ratios / ratios.mean() - 1.0) > _OFF * tol]
+        own = edge[np.abs(self.ratios() - 1.0) > _OFF * tol]
         sags = self.sags()
         worst = own[np.arange(len(own)), sags[own].argmax(axis=1)]
         marked = np.zeros(len(sags), bool)
@@ -203,12 +208,14 @@ def mapped_finer(
     for round_ in range(_ROUNDS + 1):
         at_once = round_ == 0 and finer.added.n_split > 0
         last = at_once
-        halved = finer if at_once else finer.where_off(steps.tol)
+        # What the steps on a surface have made good so far wants no more vertices.
+        enough = round_ == 0 and float(finer.ratios().std()) <= wanted
+        halved = finer if at_once else None if enough else finer.where_off(steps.tol)
         newton = None if halved is None else begun(halved)
         if newton is not None:
             assert halved is not None
             finer = halved
-        elif round_ == 0 and not at_once:  # no edge to halve: the steps left go on here
+        elif round_ == 0 and not at_once and cut_short(made.reason):
             newton, last = finer.newton(), True
         else:
             break

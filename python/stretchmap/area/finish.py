@@ -22,7 +22,7 @@ _CHART = 1.0
 _FACING = 1.0
 _GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
-_AT_REST = "energy at rest"
+_AT_REST, _MOST_DONE = "energy at rest", "most steps done"
 _STALLED = 3  # steps in a row without any length end the iteration
 _ROUGH = 8.0  # times the tolerance
 _BEST_STEPS = 2  # of the projection of the rings, where fewer do not serve
@@ -142,7 +142,7 @@ def finish_areas(
     barrier = _FACING if newton.least_facing() > 0.0 else 0.0
     taken = None
     at_rest = _rest()
-    reason = "most steps done"
+    reason = _MOST_DONE
     for iteration in range(steps.max_iter + 1):
         if iteration:
             taken = newton.step(_weights(weight, barrier))
@@ -169,6 +169,11 @@ def finish_areas(
     if rings and any(newton.project_rings(last, tol, _RATIO_GOAL * tol, best) for best in tries):
         history.append(_record("newton", len(history), None, newton.measures(), start))
     return history, *_verdict(newton.measures(), tol, reason)
+
+
+def cut_short(reason: str) -> bool:
+    """Whether more steps would have followed."""
+    return reason.startswith(_MOST_DONE)
 
 
 def _verdict(measured: _core.area.SurfaceMeasures, tol: float, reason: str) -> tuple[bool, str]:

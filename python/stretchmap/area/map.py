@@ -25,7 +25,7 @@ from ..mesh.given import as_surface, require_same_mesh
 from ..mesh.halved_faces import SurfaceRefinement
 from .coarse import Level, levels
 from .finer import Finer, goal, mapped_finer, too_coarse
-from .finish import Steps, finish_areas, unfolded
+from .finish import Steps, cut_short, finish_areas, unfolded
 from .flat import start_angles, unfolded_turns
 from .result import AreaMap
 from .route import EqualAreas, Finish, Made, Route, best_turns, follow
@@ -209,12 +209,14 @@ def _found(
         if finer is not None and finer.certificate.certified:
             return finer
     found = _along(route, stack, equal, conformal, progress, torus, work)
-    if finer is None and refine and not _folded(found) and not _good(found, wanted):
+    unfinished = not _good(found, wanted) or cut_short(found.stop_reason)
+    if finer is None and refine and unfinished and not _folded(found):
         level = Level.of(surface, found.angles / TWO_PI, conformal.forms, conformal.aspect)
         start = Finer.of(level, found.angles, found.ratio)
         made = Made(
-            found.angles, found.phase, found.ratio, list(found.history), seconds=dict(found.seconds)
-        )
+            found.angles, found.phase, found.ratio, list(found.history),
+            found.converged, found.stop_reason, dict(found.seconds),
+        )  # fmt: skip
         finer = _finer(route, start, made, progress, torus, work)
     if finer is None or not finer.certificate.certified:
         return found
@@ -331,8 +333,9 @@ def charted(
     torus: Torus | None = None,
 ) -> AreaMap:
     """The unfinished map of a route, as it is in the chart, certified or not."""
-    made = follow(route, [equal.level], progress, equal)
-    return _result(equal.level.surface, conformal.forms, made, torus)
+    surface = equal.level.surface
+    made = follow(route, [equal.level], progress, equal, Work.of(surface, refine=False))
+    return _result(surface, conformal.forms, made, torus)
 
 
 def _folded(found: AreaMap) -> int:

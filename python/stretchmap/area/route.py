@@ -97,13 +97,12 @@ def follow(
     route: Route,
     stack: list[Level],
     progress: Progress | None,
-    equal: EqualAreas | None = None,
-    work: Work | None = None,
+    equal: EqualAreas | None,
+    work: Work,
 ) -> Made:
     """Angles of the first level: by way of the last, or without if they fold on the way up.
 
-    ``equal`` is that of the last level, if there is one already. With ``work``, steps are counted
-    there and bounded by it, and what stays folded is not finished.
+    ``equal`` is that of the last level, if there is one already. What stays folded is not finished.
     """
     try:
         return _climb(route, stack, equal or EqualAreas(stack[-1], progress), progress, work)
@@ -118,7 +117,7 @@ def _climb(
     stack: list[Level],
     equal: EqualAreas,
     progress: Progress | None,
-    work: Work | None,
+    work: Work,
 ) -> Made:
     clock = time.perf_counter()
     turns, found, records = best_turns(route, equal)
@@ -137,26 +136,25 @@ def _climb(
         if level.coarse is not None:
             made.angles = level.prolonged(made.angles, ratio)
             pace = pace.finer()
-        bounded = work if finest else None
-        most = UNFOLD_STEPS if bounded is None else FEW_UNFOLD_STEPS
+        most = FEW_UNFOLD_STEPS if finest else UNFOLD_STEPS
         newton, unfolding = unfolded(
             level, made.angles, ratio, progress, keep=route.shape > 0.0, most=most
         )
         made.add(unfolding, finest)
-        if bounded is not None:
-            bounded.spend(len(unfolding))
+        if finest:
+            work.spend(len(unfolding))
             if not newton.least_facing() > 0.0:
                 made.angles, made.converged, made.reason = newton.angles, False, "faces stay folded"
                 break
-            affordable = min(max(bounded.steps(), _LEAST_STEPS), bounded.most)
+            affordable = min(max(work.steps(), _LEAST_STEPS), work.most)
             steps = dataclasses.replace(steps, max_iter=min(steps.max_iter, affordable))
         records, made.converged, made.reason = finish_areas(
             newton, finest and route.finish == "ring", steps, progress, pace
         )
         made.add(records, finest)
         made.angles = newton.angles
-        if bounded is not None:
-            bounded.spend(len(records))
+        if finest:
+            work.spend(len(records))
     made.seconds["finish"] = time.perf_counter() - clock
     return made
 
