@@ -38,6 +38,7 @@ _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
 _STEPS = 30  # of each round; fewer are not worth it
 _UNFOLDING = (1 / 4, (5, 25))  # a share of the work, and steps, until no face is folded
+_FEW_UNFOLDING = 10  # such steps that mostly suffice
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -198,7 +199,7 @@ def mapped_finer(
         """Steps from there on, if they can be afforded and lead to no folded face."""
         newton, n_faces = finer.newton(), finer.level.surface.n_faces
         folded = not newton.least_facing() > 0.0
-        if work.steps(n_faces) - folded * most_unfolding < _STEPS:
+        if work.steps(n_faces) - folded * _FEW_UNFOLDING < _STEPS:
             return None
         unfolding = unfold_faces(newton, most_unfolding, progress)
         work.spend(len(unfolding), n_faces)
