@@ -50,7 +50,7 @@ def unfolded(
     progress: Progress | None,
     *,
     keep: bool = False,
-    most: int = UNFOLD_STEPS,
+    most: int | None = None,
 ) -> tuple[_core.area.SurfaceNewton, list[IterationRecord]]:
     """What goes on from there, every face looking outward if steps lead there; records.
 
@@ -61,7 +61,7 @@ def unfolded(
     newton = level.newton(angles, ratio)
     if newton.least_facing() > 0.0:
         return newton, []
-    tried = [] if keep else unfold_faces(newton, most, progress)
+    tried = [] if keep else unfold_faces(newton, UNFOLD_STEPS if most is None else most, progress)
     if newton.least_facing() > 0.0:
         return newton, tried
     try:

@@ -15,7 +15,7 @@ from ..base.progress import Progress
 from ..maps.history import IterationRecord
 from .balance import JAMMED, balance_areas
 from .coarse import Folded, Level
-from .finish import FEW_UNFOLD_STEPS, UNFOLD_STEPS, Pace, Steps, finish_areas, unfolded
+from .finish import FEW_UNFOLD_STEPS, Pace, Steps, finish_areas, unfolded
 from .flat import start_angles
 from .search import Ratio, search_phase
 from .sem import minimize_stretch
@@ -136,7 +136,7 @@ def _climb(
         if level.coarse is not None:
             made.angles = level.prolonged(made.angles, ratio)
             pace = pace.finer()
-        most = FEW_UNFOLD_STEPS if finest else UNFOLD_STEPS
+        most = FEW_UNFOLD_STEPS if finest else None
         newton, unfolding = unfolded(
             level, made.angles, ratio, progress, keep=route.shape > 0.0, most=most
         )

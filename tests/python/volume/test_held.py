@@ -300,7 +300,7 @@ def test_what_equal_areas_leave_folded_keeps_its_shape_unless_it_is_lost(monkeyp
 
     maps = boundary_starts_module._BoundaryMaps(mug(7, 1, 6).surface, VolumeOptions(), None)
     folded = maps._chart(maps.fatter_ratio, 100.0)
-    monkeypatch.setattr(finish, "_UNFOLD_STEPS", 0)
+    monkeypatch.setattr(finish, "UNFOLD_STEPS", 0)
     if lost:
         monkeypatch.setattr(Level, "keeping", no_area)
     done = finished(folded, max_iter=0, tol=0.05)
