@@ -20,7 +20,7 @@ from ..base.torus import TWO_PI, Torus
 from ..mesh.halved_faces import SurfaceRefinement, halve_edges
 from ..mesh.surfaces import TriMesh
 from .coarse import Level, forms_of
-from .finish import Pace, Steps, cut_short, finish_areas, unfold_faces
+from .finish import Pace, Steps, cut_short, finish_areas, unfold_faces, worth_rings
 from .flat import start_angles
 from .route import Made
 from .sem import minimize_stretch
@@ -227,11 +227,11 @@ def mapped_finer(
             newton, rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
         )
         work.spend(len(records), n_faces)
-        if rings:
-            work.spend_on_rings(n_faces)
         history += records
         finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
         measured = newton.measures()
+        if rings and worth_rings(measured, steps.tol):
+            work.spend_on_rings(n_faces)
         _log.info("%d edges halved: face SD %.2e", finer.added.n_split, measured.face_std)
         before, now = error, measured.face_std if measured.flips == 0 else np.inf
         if now < error:

@@ -31,7 +31,7 @@ _AHEAD = 3  # times the weight of the area term has grown at once on a finer sur
 _REST, _SLOW = 8, 0.01  # so many steps that lower the energy by less than this share end it, too
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
 _MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings need some room
-_FAIR = 2.0  # from this face SD on, in units of tol, the shape budget counts
+_FAIR = 2.0  # face SD, in units of tol, up to which the shape budget counts and rings are tried
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 
 # Where others follow that keep shapes more, steps beyond the first are better spent there.
@@ -166,9 +166,15 @@ def finish_areas(
     # Steps that are best for the faces, too, cost as much as three Newton steps each.
     fewest = 0 if pace.prolonged else _BEST_STEPS if _within(measured, _GOOD * tol) else 1
     tries = dict.fromkeys((fewest, _BEST_STEPS))
+    rings = rings and worth_rings(measured, tol)
     if rings and any(newton.project_rings(last, tol, _RATIO_GOAL * tol, best) for best in tries):
         history.append(_record("newton", len(history), None, newton.measures(), start))
     return history, *_verdict(newton.measures(), tol, reason)
+
+
+def worth_rings(measured: _core.area.SurfaceMeasures, tol: float) -> bool:
+    """Whether rings may become exact: where faces are off by more, they would get worse."""
+    return measured.face_std <= _FAIR * tol
 
 
 def cut_short(reason: str) -> bool:

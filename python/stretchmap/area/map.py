@@ -89,10 +89,10 @@ def area_map(
         ``R / r``: that of the conformal map, the best found by a search, or given (above 1). Not
         together with ``torus``.
     finish : "ring", "face" or "none"
-        ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then a
-        projection that makes the area of every vertex ring exact, kept if the faces stay within
-        ``tol`` or do not get worse. ``"none"``: the chart's map as it is, a start for
-        others, returned whether it is certified or not.
+        ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then, where
+        their SD is at most twice ``tol``, a projection that makes the area of every vertex ring
+        exact, kept if the faces stay within ``tol`` or do not get worse. ``"none"``: the chart's
+        map as it is, a start for others, returned whether it is certified or not.
     max_iter : int
         Most Newton steps.
     tol : float
@@ -151,7 +151,7 @@ def area_map(
     halved in the chart before anything else; where areas stay off, the edges that sag most in
     faces that are off, three times at most. Where that takes too many faces or leaves some folded,
     the chart is eased first: its areas are left off for the sake of shapes. All steps together cost
-    no more than some 130 on the surface itself, more on one of less than 5,400 faces.
+    no more than some 150 on the surface itself, more on one of less than 4,800 faces.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.

@@ -90,7 +90,10 @@ class EqualAreas:
     def eased(self, shape: float, turns: NDArray[np.float64]) -> _Turns:
         """Others moved on by Newton steps with that weight of shape; with records."""
         level = dataclasses.replace(self.level, turns=turns)
-        return balance_areas(level, shape, self._progress, most=_EASING)
+        found = balance_areas(level, shape, self._progress, most=_EASING)
+        # As good a chart as any with that weight, and there already.
+        self._balanced.setdefault(shape, found)
+        return found
 
 
 def follow(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..mesh.surfaces import TriMesh
 
-_STEPS, _SMALL = 130.0, 7e5  # so many, or as many as make so many faces on a small surface
+_STEPS, _SMALL = 150.0, 7.2e5  # so many, or as many as make so many faces on a small surface
 _UNREFINED = 40  # steps where edges can be halved after them
 # Steps that others take as long as: one in the flat chart, halving edges until few sag, and rings
 # made exact.

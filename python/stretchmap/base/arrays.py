@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -311,4 +312,13 @@ def given_rows(values: ArrayLike, n: int) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim == 0 or len(array) != n:
         raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
+    return array
+
+
+def with_means(
+    array: NDArray[np.float64], groups: Iterable[NDArray[np.int32]]
+) -> NDArray[np.float64]:
+    """Rows and, after them, the means of those that each row of each group names."""
+    for ids in groups:
+        array = np.concatenate([array, array[ids].mean(axis=1)])
     return array

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import given_rows, read_only
+from ..base.arrays import given_rows, read_only, with_means
 from .surfaces import TriMesh
 
 __all__ = ["HalvedFaces", "SurfaceRefinement", "halve_edges"]
@@ -91,9 +91,7 @@ class SurfaceRefinement:
             Another number of rows.
         """
         array = given_rows(values, self.surface.n_vertices - self.n_split)
-        for ends in self.halved:
-            array = np.concatenate([array, array[ends].mean(axis=1)])
-        return array
+        return with_means(array, self.halved)
 
 
 @dataclass(frozen=True, eq=False)

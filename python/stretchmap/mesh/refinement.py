@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import given_rows, read_only
+from ..base.arrays import given_rows, read_only, with_means
 from .meshes import TetMesh
 from .split_edges import TET_EDGES, SplitSolid, split_edges
 
@@ -109,12 +108,7 @@ class Refinement:
             share = shares.reshape(-1, *np.ones(array.ndim - 1, int))
             between = (1.0 - share) * array[ends[:, 0]] + share * array[ends[:, 1]]
             array = np.concatenate([array, between])
-        rows: list[NDArray[Any]] = [array]
-        rows += [array[ids].mean(axis=1) for ids in (self.parents, self.face_parents) if len(ids)]
-        array = np.concatenate(rows)
-        for ids in self.halved:
-            array = np.concatenate([array, array[ids].mean(axis=1)])
-        return array
+        return with_means(array, (self.parents, self.face_parents, *self.halved))
 
     @classmethod
     def of(cls, split: SplitSolid) -> Refinement:
