@@ -40,8 +40,8 @@ def certified_map(
     """The map from the first start that leads to a certified one, or the best there is.
 
     Where folded faces had to be held for that, the others are tried in the time left. A start in
-    which tets stay stuck makes room for the next one; if none serves, or two thirds of the time are
-    spent and few are stuck, the best is gone on with.
+    which tets stay stuck makes room for the next one; if none serves, or no more time is left than
+    the last one took, or two thirds are spent and few are stuck, the best is gone on with.
 
     Parameters
     ----------
@@ -60,6 +60,7 @@ def certified_map(
     best, least, best_took = None, (True, 0, True, math.inf), 0.0
     vain, clock = 0.0, time.perf_counter()
     left_off = None  # the best one, where it made room
+    before, latest = budget.left, 0.0  # processor seconds the last start took, but for comparing it
 
     def in_turn() -> Iterator[Start]:
         nonlocal left_off
@@ -67,7 +68,8 @@ def certified_map(
             if another is not None:
                 yield another
             nearly = 0 < least[1] <= _NEARLY and budget.left < _LATE * budget.seconds
-            if left_off is not None and (another is None or nearly):
+            late = nearly or budget.left < latest
+            if left_off is not None and (another is None or late):
                 begin, left_off = left_off, None
                 yield begin
 
@@ -79,6 +81,7 @@ def certified_map(
             budget=budget,
             patience=begin.patience,
             hasty=begin.hasty,
+            resumed=begin.resumed,
             progress=progress,
         )
         seconds = {**outcome.seconds, "start": begin.seconds + outcome.seconds["start"]}
@@ -86,12 +89,13 @@ def certified_map(
         found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
         clock, took = time.perf_counter(), time.perf_counter() - clock
         vain += begin.others
+        before, latest = budget.left, before - budget.left - begin.others
         rank = _rank(outcome, found)
         if best is None or rank < least:
             vain += best_took
             best, least, best_took = found, rank, took
             again = dataclasses.replace(
-                begin, problem=outcome.problem, patience=1.0, hasty=False, others=0.0
+                begin, problem=outcome.problem, patience=1.0, hasty=False, resumed=True, others=0.0
             )
             left_off = again if begin.hasty else None
         else:

@@ -41,8 +41,10 @@ _RINGS = (2, 4, 8)  # reach of the patches, to begin with and where that does no
 # Inverted tets: with a larger share of all, it is not a matter of single places.
 _MOST_STUCK = 0.05
 _HELPED = 0.95  # of them are left at most where patches are worth another round
-# Shares of the tets for which another start is worth more than patches, and than wide ones.
+# Shares of the tets for which another start is worth more than patches, and than wide ones; and of
+# those given, by which the time counts, where many had to be added.
 _HOPELESS, _WIDELY = 0.01, 0.005
+_HOPELESS_GIVEN = 0.03
 _FEW_STUCK = 30  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
@@ -63,6 +65,7 @@ class _Run:
     budget: Budget  # all of it
     on_mesh: bool = False  # whether the boundary is going to glide on one
     hasty: bool = False  # whether another start follows, worth more than tets that stay stuck
+    resumed: bool = False  # whether this one had made room for others
     seconds: dict[str, float] = field(default_factory=dict)
 
     def take(self, problem: VolumeProblem) -> None:
@@ -77,6 +80,13 @@ class _Run:
     @x.setter
     def x(self, value: NDArray[np.float64]) -> None:
         self.problem = dataclasses.replace(self.problem, x=value)
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether more tets are inverted than patches are going to untangle in time."""
+        n_tets, refinement = len(self.history.model.T), self.problem.refinement
+        n_given = n_tets if refinement is None else refinement.n_given_tets
+        return _inverted(self) > min(_HOPELESS * n_tets, _HOPELESS_GIVEN * n_given)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -93,6 +103,7 @@ def solve(
     budget: Budget | None = None,
     patience: float = 1.0,
     hasty: bool = False,
+    resumed: bool = False,
     progress: Progress | None = None,
 ) -> Outcome:
     """Find a map without inverted tets and with little volume distortion.
@@ -110,6 +121,8 @@ def solve(
         Share of it that untangling may take.
     hasty : bool
         Whether to end where tets stay stuck, as other starts follow.
+    resumed : bool
+        Whether the problem is one that ended so.
     progress : Progress, optional
     """
     budget = budget or Budget.of(options, problem.solid.n_tets)
@@ -117,7 +130,7 @@ def solve(
     problem = started(problem, solver=options.solver)
     history = History(problem.model(options), budget.share(patience), progress)
     on_mesh = glide and problem.ground is not None
-    run = _Run(problem, options, history, budget, on_mesh, hasty)
+    run = _Run(problem, options, history, budget, on_mesh, hasty, resumed)
     run.seconds["start"] = time.perf_counter() - clock
     with run.timed("untangle"):
         left = _untangle(run, glide=glide and not on_mesh)
@@ -232,8 +245,9 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
     history = run.history
-    run.x = untangle_whole(history.model, run.x, history, glide=False).x
-    if run.hasty and _inverted(run) > _HOPELESS * len(history.model.T):
+    if not run.resumed:  # else it has been at its end
+        run.x = untangle_whole(history.model, run.x, history, glide=False, hasty=run.hasty).x
+    if run.hasty and run.hopeless:
         return stuck_tets(history.model, run.x, glide=False)
     stuck = _patched(run, glide=False)
     if glide and 0 < len(stuck) <= _FEW_STUCK:

@@ -43,6 +43,7 @@ class Start:
     seconds: float = 0.0  # that the harmonic map took
     others: float = 0.0  # seconds that those took it was compared with
     hasty: bool = False  # whether it makes room for the next where tets stay stuck
+    resumed: bool = False  # whether it is one that did
 
     @property
     def inverted(self) -> float:

@@ -41,6 +41,9 @@ _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to th
 _FEW, _FEW_SHARE = 30, 0.01
 _FEW_PATIENCE = 4
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
+# Steps in a row, none longer than that and none with fewer inverted elements than there had been:
+# a few of them are so far off that all others wait for them.
+_JAMMED, _SHORT = 8, 0.125
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,7 @@ def _continue(
     floor: float,
     steps: int,
     enough: Callable[[int, int], bool],
+    hasty: bool = False,
     linear: _core.volume.NewtonOptions,
     budget: Budget,
     note: Callable[[int, NDArray[np.float64], _core.volume.NewtonReport, float], None]
@@ -101,11 +105,13 @@ def _continue(
     steps = min(steps, _AWAY) if clean else steps
     epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), _WIDEST)
     patience = Patience(left, worst)
-    best = Untangled(x, left, worst)
+    best, short = Untangled(x, left, worst), 0
     for iteration in range(1, steps + 1):
         if (left == 0 and worst >= floor) or ((clean or left == 0) and patience.since >= _ENOUGH):
             break
         if (left and enough(left, patience.since)) or budget.spent:
+            break
+        if hasty and short == _JAMMED:
             break
         weights = _core.volume.EnergyWeights(1.0, 1.0, epsilon, face)
         x, step = newton.step(x, weights, linear)
@@ -115,6 +121,7 @@ def _continue(
         left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
         settled = before - after.energy <= _SETTLED * (before + 2.0)
         patience.note(left, worst, settled)
+        short = short + 1 if step.alpha <= _SHORT and left >= best.left else 0
         if (left, -worst) <= (best.left, -best.worst):
             best = Untangled(x, int(left), worst)
         if settled:
@@ -138,6 +145,7 @@ def untangle_whole(
     *,
     glide: bool,
     thorough: bool = False,
+    hasty: bool = False,
 ) -> Untangled:
     """Untangle all tets at once, until none or so few are inverted that patches serve better.
 
@@ -151,6 +159,8 @@ def untangle_whole(
         Whether the boundary may glide; then folded boundary faces are unfolded, too.
     thorough : bool
         Leave none to the patches.
+    hasty : bool
+        Leave them all to the patches where steps stay short.
     """
     o = model.options
     newton = model.newton(x, glide=glide, weights=model.roomy_weights)
@@ -175,6 +185,7 @@ def untangle_whole(
         enough=lambda left, since: (
             since >= (_FEW_PATIENCE if left <= few and not glide else o.patience)
         ),
+        hasty=hasty,
         linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
         budget=history.budget,
         note=note,

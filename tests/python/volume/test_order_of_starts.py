@@ -68,7 +68,9 @@ def order(monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int 
         # Nearly there, and late: before another start.
         ({"a": 4, "b": 9, "c": 2}, [0.7, 0.3, 0.2], 0, "abA"),
         # Late, but far from it: others first.
-        ({"a": 400, "b": 900, "c": 31}, [0.7, 0.3, 0.2, 0.15], 0, "abcC"),
+        ({"a": 400, "b": 900, "c": 31}, [0.6, 0.34, 0.2, 0.15], 0, "abcC"),
+        # No more time than the last one took: the best so far is gone on with.
+        ({"a": 400, "b": 900, "c": 31}, [0.7, 0.25, 0.2], 0, "abA"),
         # Gone on with in vain, once only: then the others.
         ({"a": 4, "b": 9, "c": 6}, [0.3, 0.25, 0.2, 0.15], 4, "aAbc"),
         # No time for any other.

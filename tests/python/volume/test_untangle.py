@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -138,7 +139,7 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
     def patched(run, *, glide):
         return np.arange(0 if cured and halved() else stuck)
 
-    def whole(model, x, history, *, glide, thorough=False):
+    def whole(model, x, history, *, glide, thorough=False, hasty=False):
         done.append("thorough" if thorough else "whole")
         return Untangled(x, stuck, -1.0)
 
@@ -150,6 +151,55 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
     assert done == (["whole"] if cured else ["whole", "thorough"])
     assert halved() == cured
     assert (run.history.budget.left > 0.5 * run.budget.seconds) == (stuck == 3)  # almost there
+
+
+@pytest.mark.parametrize(("given", "steps"), [({}, 8), ({"alpha": 0.5}, 20), ({"cured": 8}, 16)])
+def test_what_single_tets_hold_up_is_left_to_the_patches(given, steps):
+    cured, alpha = given.get("cured"), given.get("alpha", 0.1)
+
+    class Jammed(Dragging):
+        def step(self, x, weights, linear):
+            self.left = 499 if len(self.epsilons) + 1 == cured else self.left
+            return super().step(x, weights, linear)
+
+    # Short steps, but fewer inverted tets at one of them, are not in vain.
+    for hasty in (False, True):
+        newton = Jammed(500, alpha)
+        _continue(
+            newton, np.zeros((1, 3)), face=0.0, floor=0.02, steps=20, hasty=hasty,
+            enough=lambda _left, _since: False, linear=None, budget=Budget(60.0),
+        )  # fmt: skip
+        assert len(newton.epsilons) == (steps if hasty else 20)
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+def test_a_start_gone_on_with_begins_with_patches(monkeypatch, resumed):
+    run = run_of(sm.samples.bumpy_torus(600))
+    run.resumed, done = resumed, []
+
+    def whole(model, x, history, *, glide, thorough=False, hasty=False):
+        assert not hasty
+        done.append("thorough" if thorough else "whole")
+        return Untangled(x, 300, -1.0)
+
+    def patched(run, *, glide):
+        done.append("patches")
+        return np.arange(300)
+
+    monkeypatch.setattr(engine, "untangle_whole", whole)
+    monkeypatch.setattr(engine, "_patched", patched)
+    engine._untangle_inside(run, glide=True)
+    assert done == [*([] if resumed else ["whole"]), "patches", "thorough", "patches"]
+
+
+def test_where_many_tets_were_added_fewer_inverted_ones_are_hopeless(monkeypatch):
+    run = run_of(sm.samples.bumpy_torus(600))
+    n = run.problem.solid.n_tets
+    added = SimpleNamespace(n_given_tets=n // 10)
+    monkeypatch.setattr(engine, "_inverted", lambda run: int(0.008 * n))
+    assert not run.hopeless
+    run.problem = dataclasses.replace(run.problem, refinement=added)
+    assert run.hopeless
 
 
 @pytest.mark.parametrize("left", [30, 110, 130])
@@ -177,7 +227,7 @@ def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck
     run = run_of(sm.samples.bumpy_torus(600))
     run.hasty, done = True, []
 
-    def whole(model, x, history, *, glide, thorough=False):
+    def whole(model, x, history, *, glide, thorough=False, hasty=False):
         done.append("thorough" if thorough else "whole")
         return Untangled(x, stuck, -1.0)
 
