@@ -4,6 +4,7 @@
 #pragma once
 
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define STRETCHMAP_CLONES_CHOSEN  // and functions of one name for several targets are, too
 #define STRETCHMAP_CLONES \
   __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else

@@ -21,38 +21,66 @@ constexpr Index kBlock = 32;           // columns of a panel eliminated one by o
 
 Index tiles(Index n, Index size) { return (n + size - 1) / size; }
 
-// A column of a tile. Left to itself GCC loads what it is multiplied with as a vector and permutes
-// that, at half the speed.
-#if defined(__GNUC__)
-using Column = double __attribute__((vector_size(kTall * sizeof(double))));
-#else
-using Column = Eigen::Array<double, kTall, 1>;
-#endif
-
 // target(i, j) -= sum over k of a[k][i] b[k][j], i < tall, j < wide; its columns `stride` apart.
-STRETCHMAP_CLONES void subtract_tile(const double* a, const double* b, Index depth, double* target,
-                                     std::ptrdiff_t stride, Index tall, Index wide) {
-  Column sum[kWide];
-  for (Column& column : sum) std::memset(&column, 0, sizeof(column));
+// Left to itself GCC loads what a column is multiplied with as a vector and permutes that, at half
+// the speed; and vectors longer than the registers pass through memory, at a fifth of it.
+template <class Vector>
+STRETCHMAP_INLINE void subtract(const double* a, const double* b, Index depth, double* target,
+                                std::ptrdiff_t stride, Index tall, Index wide) {
+  constexpr Index kLanes = sizeof(Vector) / sizeof(double), kVectors = kTall / kLanes;
+  const double zeros[kLanes] = {};
+  Vector sum[kWide][kVectors];
+  for (Index j = 0; j < kWide; ++j)
+    for (Index v = 0; v < kVectors; ++v) std::memcpy(&sum[j][v], zeros, sizeof(Vector));
   for (Index k = 0; k < depth; ++k, a += kTall, b += kWide) {
-    Column left;
-    std::memcpy(&left, a, sizeof(left));
-    for (Index j = 0; j < kWide; ++j) sum[j] += left * b[j];
+    Vector left[kVectors];
+    for (Index v = 0; v < kVectors; ++v) std::memcpy(&left[v], a + v * kLanes, sizeof(Vector));
+    for (Index j = 0; j < kWide; ++j)
+      for (Index v = 0; v < kVectors; ++v) sum[j][v] += left[v] * b[j];
   }
   if (tall == kTall && wide == kWide) {
-    for (Index j = 0; j < kWide; ++j) {
-      Column column;
-      std::memcpy(&column, target + j * stride, sizeof(column));
-      column -= sum[j];
-      std::memcpy(target + j * stride, &column, sizeof(column));
-    }
+    for (Index j = 0; j < kWide; ++j)
+      for (Index v = 0; v < kVectors; ++v) {
+        Vector part;
+        std::memcpy(&part, target + j * stride + v * kLanes, sizeof(Vector));
+        part -= sum[j][v];
+        std::memcpy(target + j * stride + v * kLanes, &part, sizeof(Vector));
+      }
     return;
   }
   double tile[kWide * kTall];
-  std::memcpy(tile, sum, sizeof(tile));
+  for (Index j = 0; j < kWide; ++j)
+    for (Index v = 0; v < kVectors; ++v)
+      std::memcpy(tile + j * kTall + v * kLanes, &sum[j][v], sizeof(Vector));
   for (Index j = 0; j < wide; ++j)
     for (Index i = 0; i < tall; ++i) target[j * stride + i] -= tile[kTall * j + i];
 }
+
+template <Index Lanes>
+struct Lane {
+#if defined(__GNUC__)
+  using Vector = double __attribute__((vector_size(Lanes * sizeof(double))));
+#else
+  using Vector = Eigen::Array<double, Lanes, 1>;
+#endif
+};
+
+#ifdef STRETCHMAP_CLONES_CHOSEN
+#define STRETCHMAP_SUBTRACT_TILE(processor, lanes)                                          \
+  __attribute__((target(processor))) void subtract_tile(                                    \
+      const double* a, const double* b, Index depth, double* target, std::ptrdiff_t stride, \
+      Index tall, Index wide) {                                                             \
+    subtract<Lane<lanes>::Vector>(a, b, depth, target, stride, tall, wide);                 \
+  }
+STRETCHMAP_SUBTRACT_TILE("default", 2)
+STRETCHMAP_SUBTRACT_TILE("arch=x86-64-v3", 4)
+STRETCHMAP_SUBTRACT_TILE("arch=x86-64-v4", 8)
+#else
+void subtract_tile(const double* a, const double* b, Index depth, double* target,
+                   std::ptrdiff_t stride, Index tall, Index wide) {
+  subtract<Lane<2>::Vector>(a, b, depth, target, stride, tall, wide);
+}
+#endif
 
 // The columns right of `c` up to `end`, and the rows from there on up to `end`, less the outer
 // product.

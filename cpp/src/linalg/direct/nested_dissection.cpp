@@ -1,13 +1,16 @@
 #include "linalg/direct/nested_dissection.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
+#include <utility>
 
 namespace stretchmap::linalg {
 
 namespace {
 
-constexpr Index kLeaf = 32;  // pieces up to this size are not divided
+constexpr Index kLeaf = 32;       // pieces up to this size are not divided
+constexpr double kSmaller = 0.3;  // share of a piece that either half has, where one can cut so
 
 class Dissector {
  public:
@@ -53,19 +56,56 @@ class Dissector {
       middle = partition(first, last, [&](Index v) { return piece_[v] == -1; });
       return first;
     }
-    // Two ends far apart; the curve equally far from both is straighter than a front round one.
+    // Two ends far apart; curves along which the distances from them differ by as much are
+    // straighter than fronts round one.
     const Index end = queue_.back();
     search(end, label, near_);
     search(queue_.back(), label, far_);
-    const auto key = [&](Index v) { return near_[v] - far_[v]; };
-    std::vector<Index> keys(size);
-    for (Index i = 0; i < size; ++i) keys[i] = key(items_[first + i]);
-    std::nth_element(keys.begin(), keys.begin() + size / 2, keys.end());
-    const Index cut = keys[size / 2];
+    const Index cut = thinnest_cut(first, last, label);
     middle = partition(first, last, [&](Index v) { return key(v) < cut; });
-    if (middle == first) middle = partition(first, last, [&](Index v) { return key(v) <= cut; });
     if (middle == last) return last;  // no vertex farther than another: not to be divided
     return thinner_border(first, middle, last, label);
+  }
+
+  Index key(Index v) const { return near_[v] - far_[v]; }
+
+  // The least key of a second half such that the fewest vertices separate it from the first.
+  Index thinnest_cut(Index first, Index last, Index label) const {
+    const Index size = last - first;
+    const auto [low, high] = std::minmax_element(items_.begin() + first, items_.begin() + last,
+                                                 [&](Index v, Index w) { return key(v) < key(w); });
+    const Index least = key(*low), cuts = key(*high) - least;
+    // What cut c adds to cut c - 1: vertices before it; and those before and behind next to it.
+    std::vector<Index> before(cuts + 2, 0), inner(cuts + 2, 0), outer(cuts + 2, 0);
+    for (Index i = first; i < last; ++i) {
+      const Index v = items_[i], own = key(v) - least;
+      Index lowest = own, highest = own;
+      for (Index e = start_[v]; e < start_[v + 1]; ++e) {
+        if (piece_[col_[e]] != label) continue;
+        lowest = std::min(lowest, key(col_[e]) - least);
+        highest = std::max(highest, key(col_[e]) - least);
+      }
+      ++before[own + 1];
+      ++inner[own + 1];
+      --inner[highest + 1];
+      ++outer[lowest + 1];
+      --outer[own + 1];
+    }
+    Index best = 1, fewest = size + 1, nearest = size;
+    Index smaller = 0, within = 0, beyond = 0;
+    for (Index c = 1; c <= cuts; ++c) {
+      smaller += before[c];
+      within += inner[c];
+      beyond += outer[c];
+      const bool fair = std::min(smaller, size - smaller) >= kSmaller * size;
+      const Index thin = fair ? std::min(within, beyond) : size;
+      const Index off = std::abs(2 * smaller - size);
+      if (std::pair(thin, off) >= std::pair(fewest, nearest)) continue;
+      best = c;
+      fewest = thin;
+      nearest = off;
+    }
+    return least + best;
   }
 
   // Breadth first from `root` inside a piece: distances, and the vertices in queue_.
