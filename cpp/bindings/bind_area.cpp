@@ -113,11 +113,12 @@ void bind_glide(py::module_& m) {
       .def(
           "project_rings",
           [](SurfaceNewton& self, const SurfaceWeights& weights, double face_std, double face_error,
-             int best_steps) {
-            return self.project_rings(weights, face_std, face_error, best_steps, signal_poll());
+             int least_best, int most_best) {
+            return self.project_rings(weights, face_std, face_error, least_best, most_best,
+                                      signal_poll());
           },
-          py::arg("weights"), py::arg("face_std"), py::arg("face_error"), py::arg("best_steps"),
-          release_gil())
+          py::arg("weights"), py::arg("face_std"), py::arg("face_error"), py::arg("least_best"),
+          py::arg("most_best"), release_gil())
       .def("measures", &SurfaceNewton::measures, release_gil())
       .def("least_facing", &SurfaceNewton::facing, release_gil())
       .def_property_readonly("angles", &SurfaceNewton::angles, py::return_value_policy::copy);

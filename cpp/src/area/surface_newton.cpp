@@ -15,8 +15,9 @@ namespace stretchmap::area {
 namespace {
 
 constexpr double kRingGoal = 1e-10;  // deviation of the ring ratios that counts as exact
-constexpr int kRingSteps = 12;       // towards it at most
+constexpr int kRingSteps = 20;       // towards it at most
 constexpr int kWorth = 8;            // steps a factor is kept for: a new one costs as much
+constexpr double kSlack = 1.2;       // the steps that follow those best for the faces gain at most
 constexpr int kGlideTries = 30;
 constexpr double kHoldRotation = 1e-9;  // of the mean diagonal: holds the rotation about the axis
 
@@ -78,34 +79,54 @@ double SurfaceNewton::longest_step(const Points2& direction) const {
 }
 
 bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std, double face_error,
-                                  int best_steps, const Poll& poll) {
+                                  int least_best, int most_best, const Poll& poll) {
   system_.reset();
   if (!rings_) rings_.emplace(problem_.chart.faces, problem_.chart.n_vertices);
   const Points2 start = angles_;
   const SurfaceMeasures before = measures();
+  const auto within = [&](const SurfaceMeasures& now, double slack) {
+    return now.face_std <= slack * std::max(before.face_std, face_std) &&
+           now.face_error <= slack * std::max(before.face_error, face_error);
+  };
+  const auto good = [&](const SurfaceMeasures& now) {
+    return now.flips <= before.flips && within(now, 1.0);
+  };
+  SurfaceMeasures now = before;
   const auto take = [&](RingStep kind) {
     if (poll) poll();
     const Points2 direction = without_rotation(
         rings_->step(problem_, weights, best_scale(problem_, angles_), angles_, kind, poll));
     angles_ += longest_step(direction) * direction;
-    return measures();
+    now = measures();
   };
-  SurfaceMeasures now = before;
   try {
-    RingStep kind = best_steps > 0 ? RingStep::kBest : RingStep::kStiff;
+    int best = 0;
+    Points2 after_best = start;
+    RingStep kind = least_best > 0 ? RingStep::kBest : RingStep::kStiff;
     for (int step = 0; step < kRingSteps && now.ring_std > kRingGoal; ++step) {
       const double sd = now.ring_std;
-      now = take(kind);
-      kind = step + 1 < best_steps            ? RingStep::kBest
-             : nearly_exact(sd, now.ring_std) ? RingStep::kAgain
-                                              : RingStep::kStiff;
+      take(kind);
+      const bool was_best = kind == RingStep::kBest;
+      if (was_best) {
+        ++best;
+        after_best = angles_;
+      }
+      if (best < least_best) continue;
+      // The other steps make rings exact and leave faces as they are.
+      if (was_best ? within(now, kSlack) : good(now)) {
+        const bool again = !was_best && nearly_exact(sd, now.ring_std);
+        kind = again ? RingStep::kAgain : RingStep::kStiff;
+      } else if (best < most_best) {
+        angles_ = after_best;
+        kind = RingStep::kBest;
+      } else {
+        break;
+      }
     }
   } catch (const Error&) {  // singular: nothing to be had
     now.ring_std = std::numeric_limits<double>::infinity();
   }
-  if (now.flips <= before.flips && now.ring_std <= kRingGoal &&
-      now.face_std <= std::max(before.face_std, face_std) &&
-      now.face_error <= std::max(before.face_error, face_error)) {
+  if (now.ring_std <= kRingGoal && good(now)) {
     rings_.reset();
     return true;
   }

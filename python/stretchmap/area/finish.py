@@ -165,9 +165,8 @@ def finish_areas(
     last = _weights(min(weight, _RING_WEIGHT), barrier)
     # Steps that are best for the faces, too, cost as much as three Newton steps each.
     fewest = 0 if pace.prolonged else _BEST_STEPS if _within(measured, _GOOD * tol) else 1
-    tries = dict.fromkeys((fewest, _BEST_STEPS))
     rings = rings and worth_rings(measured, tol)
-    if rings and any(newton.project_rings(last, tol, _RATIO_GOAL * tol, best) for best in tries):
+    if rings and newton.project_rings(last, tol, _RATIO_GOAL * tol, fewest, _BEST_STEPS):
         history.append(_record("newton", len(history), None, newton.measures(), start))
     return history, *_verdict(newton.measures(), tol, reason)
 

@@ -10,7 +10,7 @@ _STEPS, _SMALL = 150.0, 7.2e5  # so many, or as many as make so many faces on a 
 _UNREFINED = 40  # steps where edges can be halved after them
 # Steps that others take as long as: one in the flat chart, halving edges until few sag, and rings
 # made exact.
-_CHART, _FITTING, _RINGS = 0.4, 4.0, 5.0
+_CHART, _FITTING, _RINGS = 0.4, 4.0, 3.0
 
 
 @dataclass

@@ -23,12 +23,13 @@ class SurfaceNewton {
   // \throws Error "SolverError" when the factorization breaks down.
   NewtonStep step(const SurfaceWeights& weights, const Poll& poll = {});
 
-  // Makes the ring areas exact: `best_steps` of RingSystem that are best for the faces, then
-  // stiff ones; after one that gained enough the next reuses its factor.
+  // Makes the ring areas exact: `least_best` steps of RingSystem that are best for the faces, up to
+  // `most_best` while these are not as asked, then stiff ones; after one that gained enough the
+  // next reuses its factor.
   // \return false, and nothing is changed, if that cannot be done without a flip or raises a figure
   //         of the faces above both what it was and the limit given.
   bool project_rings(const SurfaceWeights& weights, double face_std, double face_error,
-                     int best_steps, const Poll& poll = {});
+                     int least_best, int most_best, const Poll& poll = {});
 
   // \return of the polyhedral image; flips are the faces that break the certificate's condition.
   SurfaceMeasures measures() const;
