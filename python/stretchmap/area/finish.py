@@ -36,9 +36,11 @@ _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the ring
 
 # Where others follow that keep shapes more, steps beyond the first are better spent there.
 UNFOLD_STEPS, FEW_UNFOLD_STEPS = 100, 40
-# Where faces that keep what they have could be unfolded at all, it took up to 24.
-_KEEPING_STEPS = 30
+_KEEPING_STEPS = 80
 _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing any more
+# In so many steps the fewest faces folded so far are to become fewer by that factor: what is mostly
+# folded or folds ever more faces is not unfolded by any number of steps.
+_WINDOW, _FEWER = 10, 0.7
 _EPSILON = 0.2  # of the worst face
 _LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
 
@@ -78,10 +80,14 @@ def unfolded(
 def unfold_faces(
     newton: _core.area.SurfaceNewton, steps: int, progress: Progress | None
 ) -> list[IterationRecord]:
-    """Newton steps on the regularized energy until every face looks outward, or no step is left."""
+    """Newton steps on the regularized energy until every face looks outward.
+
+    At most ``steps``, and no more where the number of those that do not hardly falls.
+    """
     start = time.perf_counter()
     history: list[IterationRecord] = []
     short = 0
+    fewest: list[int] = []
     for iteration in range(steps):
         facing = newton.least_facing()
         if facing > 0.0:
@@ -91,7 +97,9 @@ def unfold_faces(
         history.append(_record("untangle", iteration + 1, taken, newton.measures(), start))
         report(progress, "area", iteration, steps, flips=history[-1].flips)
         short = short + 1 if taken.step < _SHORT else 0
-        if taken.step == 0.0 or short == _JAMMED:
+        fewest.append(min([*fewest[-1:], history[-1].flips]))
+        slow = len(fewest) > _WINDOW and fewest[-1] > _FEWER * fewest[-1 - _WINDOW]
+        if taken.step == 0.0 or short == _JAMMED or slow:
             break
     return history
 

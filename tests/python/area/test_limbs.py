@@ -91,14 +91,25 @@ def test_areas_give_way_where_they_would_fold_faces(monkeypatch, n_tets, rings):
         sm.area_map(surface, refine=False)
 
 
-@pytest.mark.parametrize(("lengths", "taken"), [((1e-4,), 10), ((1e-4,) * 9 + (0.5,), 100)])
-def test_unfolding_that_is_jammed_ends(monkeypatch, lengths, taken):
-    """Ten steps in a row that hardly move show that no other will; a longer one shows it moves."""
-    monkeypatch.setattr(finish, "_record", lambda *_: SimpleNamespace(flips=1))
+def _steps_taken(monkeypatch, lengths, share) -> int:
+    """Of 100, with steps of these lengths over and over, each leaving that share of the folds."""
+    flips = (int(1e6 * share**k) for k in itertools.count())
+    monkeypatch.setattr(finish, "_record", lambda *_: SimpleNamespace(flips=next(flips)))
     given = itertools.cycle(lengths)
     newton = SimpleNamespace(
         least_facing=lambda: -0.1,
         step=lambda _: SimpleNamespace(step=next(given)),
         measures=lambda: None,
     )
-    assert len(finish.unfold_faces(newton, 100, None)) == taken
+    return len(finish.unfold_faces(newton, 100, None))
+
+
+@pytest.mark.parametrize(("lengths", "taken"), [((1e-4,), 10), ((1e-4,) * 9 + (0.5,), 100)])
+def test_unfolding_that_is_jammed_ends(monkeypatch, lengths, taken):
+    """Ten steps in a row that hardly move show that no other will; a longer one shows it moves."""
+    assert _steps_taken(monkeypatch, lengths, 0.9) == taken
+
+
+@pytest.mark.parametrize(("share", "taken"), [(0.9, 100), (0.99, 11), (1.0, 11), (1.1, 11)])
+def test_unfolding_that_leaves_as_many_folded_ends(monkeypatch, share, taken):
+    assert _steps_taken(monkeypatch, (0.5,), share) == taken
