@@ -19,6 +19,7 @@ from ..base.progress import Progress
 from ..base.torus import TWO_PI, Torus
 from ..mesh.halved_faces import SurfaceRefinement, halve_edges
 from ..mesh.surfaces import TriMesh
+from .balance import balance_areas
 from .coarse import Level, forms_of
 from .finish import Pace, Steps, cut_short, finish_areas, unfold_faces, worth_rings
 from .flat import start_angles
@@ -33,6 +34,7 @@ _FAR, _MANY = 2.0, 0.005  # more than this share of the edges with more sag than
 _SLIVER = 3.0  # times the median: longer faces are given the height they would have at that
 _GROWTH, _SPARE = 2.5, 12_000  # most faces: so many times those of the input, and so many more
 _PASSES = 14
+_RESHAPING = 12  # Newton steps in the chart once edges are halved
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
@@ -128,15 +130,31 @@ class Finer:
 
     def evened(self, sem_iter: int, progress: Progress | None) -> Finer:
         """With areas made equal in the chart, which coarse faces had not allowed."""
+        level = self._in_chart()
+        if level is None:
+            return self
+        return self._with(level, minimize_stretch(level, sem_iter, progress)[0])
+
+    def reshaped(self, progress: Progress | None, work: Work) -> Finer:
+        """With Newton steps in the chart, which give faces back shapes that areas had cost them."""
+        level = self._in_chart()
+        if level is None:
+            return self
+        turns, records = balance_areas(level, 0.0, progress, most=_RESHAPING)
+        work.spend_in_chart(len(records), level.surface.n_faces)
+        return self._with(level, turns)
+
+    def _in_chart(self) -> Level | None:
+        """The level over the flat chart of equal areas; None where faces are folded there."""
         u, v = self.angles.T
         turns = np.column_stack([u, v + np.sin(v) / self.ratio]) / TWO_PI
         if not (_core.area.turn_areas(self.level.chart, turns) > 0.0).all():
-            return self
-        level = Level.of(self.level.surface, turns, self.level.forms, self.level.aspect)
-        turns, _ = minimize_stretch(level, sem_iter, progress)
-        return Finer(
-            level, start_angles(level.chart, turns, 0.0, self.ratio), self.ratio, self.added
-        )
+            return None
+        return Level.of(self.level.surface, turns, self.level.forms, self.level.aspect)
+
+    def _with(self, level: Level, turns: NDArray[np.float64]) -> Finer:
+        angles = start_angles(level.chart, turns, 0.0, self.ratio)
+        return Finer(level, angles, self.ratio, self.added)
 
     def newton(self) -> _core.area.SurfaceNewton:
         """Steps from here on."""

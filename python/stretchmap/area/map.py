@@ -250,7 +250,8 @@ def _finer_at_once(
         work.spend_on_fitting()
         finer = Finer.of(level, angles, ratio).fitted()
         if finer is not None and not shape:
-            finer = finer.evened(route.sem_iter, progress).fitted()
+            evened = finer.evened(route.sem_iter, progress)
+            finer = evened.reshaped(progress, work).fitted() or evened.fitted()
         if finer is not None:
             seconds = {"sem": time.perf_counter() - clock}
             made = Made(angles, phase, ratio, records, seconds=seconds)

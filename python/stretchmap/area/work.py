@@ -37,13 +37,13 @@ class Work:
         left = max(_STEPS, _SMALL / n_faces)
         return cls(n_faces, left, _UNREFINED if refine else int(left))
 
-    def spend(self, steps: int, n_faces: int | None = None) -> None:
+    def spend(self, steps: int, n_faces: int | None = None, each: float = 1.0) -> None:
         """Newton steps on a surface of so many faces."""
-        self.left -= steps * (n_faces or self.n_faces) / self.n_faces
+        self.left -= each * steps * (n_faces or self.n_faces) / self.n_faces
 
-    def spend_in_chart(self, steps: int) -> None:
-        """Newton steps in the flat chart of the surface given."""
-        self.left -= _CHART * steps
+    def spend_in_chart(self, steps: int, n_faces: int | None = None) -> None:
+        """Newton steps in the flat chart of a surface of so many faces."""
+        self.spend(steps, n_faces, _CHART)
 
     def spend_on_fitting(self) -> None:
         """Edges of the surface given halved until none sags too much."""

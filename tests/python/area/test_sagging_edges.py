@@ -120,6 +120,8 @@ def test_steps_are_counted_by_their_faces() -> None:
     assert work.left == 120.0 and work.steps() == 120 and work.steps(64_000) == 30
     work.spend_in_chart(100)
     assert work.left == pytest.approx(80.0)
+    work.spend_in_chart(10, 32_000)
+    assert work.left == pytest.approx(72.0)
     work.spend(200)
     assert work.steps() == 0
     assert Work.of(sm.samples.torus_surface(), refine=False).left > 150.0
