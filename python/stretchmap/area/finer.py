@@ -224,22 +224,21 @@ def mapped_finer(
         history.extend(unfolding)
         return newton if newton.least_facing() > 0.0 else None
 
+    last, reason, pace = False, made.reason, Pace(_HEAVY)
     for round_ in range(_ROUNDS + 1):
         at_once = round_ == 0 and finer.added.n_split > 0
-        last = at_once
         # What the steps on a surface have made good so far wants no more vertices.
         enough = round_ == 0 and float(finer.ratios().std()) <= wanted
         halved = finer if at_once else None if enough else finer.where_off(steps.tol)
         newton = None if halved is None else begun(halved)
         if newton is not None:
             assert halved is not None
-            finer = halved
-        elif round_ == 0 and not at_once and cut_short(made.reason):
+            finer, last, pace = halved, at_once, Pace() if at_once else Pace(_HEAVY)
+        elif not last and cut_short(reason):
             newton, last = finer.newton(), True
         else:
             break
         n_faces = finer.level.surface.n_faces
-        pace = Pace() if at_once else Pace(_HEAVY)
         most = min(work.steps(n_faces) if last else _STEPS, steps.max_iter)
         records, converged, reason = finish_areas(
             newton, rings, Steps(most, steps.tol, steps.shape_budget), progress, pace

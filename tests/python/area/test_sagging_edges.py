@@ -9,8 +9,11 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import TriMesh, _core
+from stretchmap.area import finer
 from stretchmap.area.coarse import Level
-from stretchmap.area.finer import Finer, goal, too_coarse
+from stretchmap.area.finer import Finer, goal, mapped_finer, too_coarse
+from stretchmap.area.finish import Steps
+from stretchmap.area.route import Made
 from stretchmap.area.work import Work
 from stretchmap.base.torus import TWO_PI
 from stretchmap.mesh.halved_faces import halve_edges
@@ -125,6 +128,25 @@ def test_steps_are_counted_by_their_faces() -> None:
     work.spend(200)
     assert work.steps() == 0
     assert Work.of(sm.samples.torus_surface(), refine=False).left > 150.0
+
+
+def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> None:
+    start = start_of(sm.samples.bumpy_torus(1000).surface)
+    where_off, asked = Finer.where_off, []
+
+    def once(self: Finer, tol: float) -> Finer | None:
+        asked.append(tol)
+        return where_off(self, tol) if len(asked) == 1 else None
+
+    monkeypatch.setattr(Finer, "where_off", once)
+    monkeypatch.setattr(finer, "_STEPS", 3)
+    made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
+    n_faces = start.level.surface.n_faces
+    work = Work(n_faces, 30.0, 40)
+    found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
+    assert found is not None and len(asked) >= 2 and found[1].added.n_split
+    assert [record.iteration for record in found[0].history].count(0) == 2
+    assert work.steps(found[1].level.surface.n_faces) == 0
 
 
 def test_slivers_are_asked_for_less() -> None:
