@@ -26,7 +26,9 @@ from .model import FIXED, GLIDING, History, SolidModel
 
 __all__ = ["Untangled", "folded_faces", "stuck_tets", "untangle_patches", "untangle_whole"]
 
-_WIDEST = 1.0  # epsilon: determinants are 1 where all is well, a larger one tells nothing apart
+# Epsilon: determinants are 1 where all is well, a larger one tells nothing apart. But where a few
+# are inverted to many times that, one of 1 hides all others behind them, and steps are short.
+_WIDEST, _WIDEST_OF_PATCH = 1.0, 20.0
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
@@ -92,6 +94,7 @@ def _continue(
     steps: int,
     enough: Callable[[int, int], bool],
     hasty: bool = False,
+    widest: float = _WIDEST,
     linear: _core.volume.NewtonOptions,
     budget: Budget,
     note: Callable[[int, NDArray[np.float64], _core.volume.NewtonReport, float], None]
@@ -103,7 +106,7 @@ def _continue(
     # A better worst tet is not worth turning others over for long, nor many steps.
     clean = left == 0
     steps = min(steps, _AWAY) if clean else steps
-    epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), _WIDEST)
+    epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), widest)
     patience = Patience(left, worst)
     best, short = Untangled(x, left, worst), 0
     for iteration in range(1, steps + 1):
@@ -120,13 +123,15 @@ def _continue(
             note(iteration, x, step, epsilon)
         left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
         settled = before - after.energy <= _SETTLED * (before + 2.0)
+        wide = epsilon > _WIDEST
+        patience = Patience() if wide else patience  # others turn over until those far off are back
         patience.note(left, worst, settled)
         short = short + 1 if step.alpha <= _SHORT and left >= best.left else 0
         if (left, -worst) <= (best.left, -best.worst):
             best = Untangled(x, int(left), worst)
         if settled:
             drags = left <= _FEW and patience.since >= _DRAGS and not face
-            swift = drags and step.alpha >= 1.0
+            swift = (drags or wide) and step.alpha >= 1.0
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
 
@@ -315,6 +320,7 @@ def untangle_patches(
             floor=o.floor,
             steps=_PATCH_STEPS,
             enough=lambda left, since: since >= _PATCH_PATIENCE,
+            widest=_WIDEST_OF_PATCH,
             linear=_core.volume.NewtonOptions(tol=1e-2, max_cg=o.max_cg),
             budget=budget,
         )

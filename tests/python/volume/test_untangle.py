@@ -60,6 +60,36 @@ def test_all_else_goes_the_published_pace(given):
     assert paces(**given) == pytest.approx(0.9)
 
 
+def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
+    far, near = Dragging(500, worst=-400.0), Dragging(500, worst=-400.0)
+    for newton, widest in ((far, 20.0), (near, 1.0)):
+        _continue(
+            newton, np.zeros((1, 3)), face=0.0, floor=0.02, steps=200, widest=widest,
+            enough=lambda _left, since: since >= 40, linear=None, budget=Budget(60.0),
+        )  # fmt: skip
+    # Nothing is given up while others turn over for it.
+    narrow = np.flatnonzero(np.array(far.epsilons) <= 1.0)[0]
+    assert far.epsilons[0] == 20.0 and len(far.epsilons) == narrow + 40
+    assert near.epsilons[0] == 1.0 and len(near.epsilons) == 40
+
+
+@pytest.mark.parametrize("amplitude", [1.0, 10.0])
+def test_a_patch_turned_inside_out_and_blown_up_is_untangled(amplitude):
+    solid = sm.samples.bumpy_torus(6000)
+    problem = VolumeProblem.of(solid, solid.V[solid.boundary_vertices])
+    problem = started(problem, solver="auto")
+    model, x = problem.model(VolumeOptions()), problem.x.copy()
+    inner = np.setdiff1d(np.arange(len(x)), model.boundary)
+    near = np.linalg.norm(x[inner] - x[inner[0]], axis=1)
+    some = inner[np.argsort(near)[:40]]
+    middle = x[some].mean(axis=0)
+    x[some] = middle - amplitude * (x[some] - middle)
+    stuck = untangle.stuck_tets(model, x, glide=False)
+    assert len(stuck) > 100
+    found = untangle.untangle_patches(model, x, stuck, rings=2, glide=False, budget=Budget(60.0))
+    assert not len(untangle.stuck_tets(model, found, glide=False))
+
+
 class Breeding(Dragging):
     """One whose every step turns a tet over."""
 
