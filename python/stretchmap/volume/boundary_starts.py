@@ -15,11 +15,12 @@ from ..area.map import SHAPES, charted, equal_areas, finished, turned
 from ..area.result import AreaMap
 from ..area.route import Route
 from ..area.search import Ratio
-from ..base.progress import Progress
+from ..base.progress import Progress, report
 from ..conformal.map import conformal_map
 from ..errors import SolverError
 from ..mesh.meshes import TetMesh, TriMesh
 from .anisotropy import unstretching
+from .budget import Budget, Spent
 from .options import VolumeOptions
 
 __all__ = ["boundary_starts"]
@@ -33,6 +34,7 @@ _LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a li
 # Times the ratio of the fattest, each with both weights of shape: coarse triangles fold on one, and
 # both sides of a thin wall get stuck in each other on another.
 _LESS_FAT = (1.0, 1.6, 2.5)
+_LONGEST = 0.5  # share of the time left that making another one may take
 _LOST = 1e-16  # of its area a face has no more
 # Share of the faces that do not look outward from which on turning them was not seen to succeed
 # where areas are equal (from 0.0317 on it failed, up to 0.0268 it did not).
@@ -40,7 +42,12 @@ _TOO_MANY = 0.03
 
 
 def boundary_starts(
-    solid: TetMesh, options: VolumeOptions, *, glide: bool, progress: Progress | None
+    solid: TetMesh,
+    options: VolumeOptions,
+    *,
+    glide: bool,
+    budget: Budget | None = None,
+    progress: Progress | None,
 ) -> Iterator[AreaMap]:
     """Each is for the case that those before it lead nowhere, and made only then.
 
@@ -55,6 +62,8 @@ def boundary_starts(
     glide : bool
         Whether the boundary will move. Then a stretch common to all tets is undone first, and the
         maps say so: they do not preserve the areas of the surface as it is.
+    budget : Budget, optional
+        None that would take most of what is left is made, but the first.
     progress : Progress or None
 
     Yields
@@ -72,7 +81,7 @@ def boundary_starts(
     if unstretch is not None:
         surface = TriMesh(surface.V @ unstretch, surface.F)
     maps = _BoundaryMaps(surface, options, progress)
-    for found in _all_there_are(maps.gliding() if glide else maps.held()):
+    for found in _all_there_are(maps, maps.gliding() if glide else maps.held(), budget):
         if unstretch is not None:
             reason = f"{found.stop_reason}, a stretch of the surface undone"
             found = dataclasses.replace(
@@ -81,33 +90,44 @@ def boundary_starts(
         yield found
 
 
-def _all_there_are(makers: Iterable[Callable[[], AreaMap | None]]) -> Iterator[AreaMap]:
-    """What they make; an error is raised only if none makes anything."""
+def _all_there_are(
+    maps: _BoundaryMaps, makers: Iterable[Callable[[], AreaMap | None]], budget: Budget | None
+) -> Iterator[AreaMap]:
+    """What they make in time; an error is raised only if none makes anything."""
     failed, any_made = None, False
     for make in makers:
         try:
             found = make()
-        except SolverError as error:
-            _log.info("one start less: %s", error)
-            failed = failed or error
+        except (SolverError, Spent) as error:
+            _log.info("one start less: %s", error or "it takes too long")
+            failed = failed or (error if isinstance(error, SolverError) else None)
             continue
         if found is not None:
             any_made = True
             yield found
+            if budget is not None:
+                maps.limit = budget.share(_LONGEST)
     if failed is not None and not any_made:
         raise failed
 
 
 class _BoundaryMaps:
     def __init__(self, surface: TriMesh, options: VolumeOptions, progress: Progress | None) -> None:
-        self.surface, self.phase, self.progress = surface, options.phase, progress
+        self.surface, self.phase, self._given = surface, options.phase, progress
+        self.limit: Budget | None = None  # for the next ones
         self.conformal = conformal_map(surface, progress=progress)
-        self.equal = equal_areas(surface, self.conformal, progress)
+        self.equal = equal_areas(surface, self.conformal, self.progress)
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
         self.got_stuck = False
         tori = [self.fatter_ratio * more for more in _LESS_FAT]
         self.gentler = iter([(ratio, shape) for ratio in tori for shape in (_GENTLE, _LIGHTER)])
+
+    def progress(self, stage: str, done: int, total: int, **values: float) -> None:
+        """Pass it on, unless there is no time left for what reports it."""
+        if self.limit is not None and self.limit.spent:
+            raise Spent
+        report(self._given, stage, done, total, **values)
 
     def gliding(self) -> Iterator[Callable[[], AreaMap | None]]:
         """What makes them one after the other, for a boundary that will move."""

@@ -6,9 +6,13 @@ import time
 
 from .options import FillOptions
 
-__all__ = ["Budget"]
+__all__ = ["Budget", "Spent"]
 
 _LEAST_SECONDS, _MARGIN = 4.5, 0.9  # a stage under way is ended
+
+
+class Spent(Exception):
+    """What was under way has no time left."""
 
 
 class Budget:

@@ -66,7 +66,7 @@ def ranked_starts(
     """
 
     def begun() -> Iterator[Start]:
-        for found in boundary_starts(solid, options, glide=glide, progress=progress):
+        for found in boundary_starts(solid, options, glide=glide, budget=budget, progress=progress):
             clock = time.perf_counter()
             problem = VolumeProblem.of(solid, found.image, torus=found.torus, refine=options.refine)
             problem = started(problem, solver=options.solver)

@@ -95,6 +95,25 @@ def test_comparing_ends_with_the_starts_and_with_its_share_of_the_time(monkeypat
     assert ranked(monkeypatch, maps, seconds=0.0)[0] == maps
 
 
+def test_one_that_takes_most_of_the_time_left_is_given_up_for_the_next(monkeypatch, plain):
+    def endless(maps):
+        while True:
+            maps.progress("area", 0, 0)
+
+    def gliding(maps):
+        yield lambda: plain
+        yield lambda: endless(maps)
+        yield lambda: endless(maps)  # no time of its own
+        yield lambda: twisted(plain, 3.0)
+        yield lambda: endless(maps)
+
+    monkeypatch.setattr(boundary_starts_module._BoundaryMaps, "gliding", gliding)
+    budget = Budget(0.4)
+    found = list(boundary_starts(SOLID, VolumeOptions(), glide=True, budget=budget, progress=None))
+    assert len(found) == 2 and found[0] is plain
+    assert budget.left <= 0.21  # half went into the first, half of the rest into the last
+
+
 def test_one_that_is_as_dear_as_all_there_is_is_not_waited_for(monkeypatch, plain):
     bad = twisted(plain, 3.0)
 
