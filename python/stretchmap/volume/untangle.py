@@ -26,9 +26,10 @@ from .model import FIXED, GLIDING, History, SolidModel
 
 __all__ = ["Untangled", "folded_faces", "stuck_tets", "untangle_patches", "untangle_whole"]
 
-# Epsilon: determinants are 1 where all is well, a larger one tells nothing apart. But where a few
-# are inverted to many times that, one of 1 hides all others behind them, and steps are short.
-_WIDEST, _WIDEST_OF_PATCH = 1.0, 20.0
+# Epsilon: determinants are 1 where all is well, a larger one tells nothing apart. But where some
+# are inverted to many times that, one of 1 hides all others behind them, and steps are short. Down
+# to the narrow one more tets turn over than had been inverted, which shows nothing.
+_WIDEST, _WIDEST_FROM_AFAR, _NARROW = 1.0, 20.0, 0.1
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
@@ -94,7 +95,7 @@ def _continue(
     steps: int,
     enough: Callable[[int, int], bool],
     hasty: bool = False,
-    widest: float = _WIDEST,
+    from_afar: bool = False,
     linear: _core.volume.NewtonOptions,
     budget: Budget,
     note: Callable[[int, NDArray[np.float64], _core.volume.NewtonReport, float], None]
@@ -104,7 +105,7 @@ def _continue(
     state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
     left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
     # A better worst tet is not worth turning others over for long, nor many steps.
-    clean = left == 0
+    clean, widest = left == 0, _WIDEST_FROM_AFAR if from_afar else _WIDEST
     steps = min(steps, _AWAY) if clean else steps
     epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), widest)
     patience = Patience(left, worst)
@@ -123,15 +124,15 @@ def _continue(
             note(iteration, x, step, epsilon)
         left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
         settled = before - after.energy <= _SETTLED * (before + 2.0)
-        wide = epsilon > _WIDEST
-        patience = Patience() if wide else patience  # others turn over until those far off are back
+        wide = from_afar and epsilon > _NARROW
+        patience = Patience() if wide else patience
         patience.note(left, worst, settled)
         short = short + 1 if step.alpha <= _SHORT and left >= best.left else 0
         if (left, -worst) <= (best.left, -best.worst):
             best = Untangled(x, int(left), worst)
         if settled:
-            drags = left <= _FEW and patience.since >= _DRAGS and not face
-            swift = (drags or wide) and step.alpha >= 1.0
+            drags = left <= _FEW and patience.since >= _DRAGS
+            swift = (drags or wide) and step.alpha >= 1.0 and not face
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
 
@@ -191,6 +192,8 @@ def untangle_whole(
             since >= (_FEW_PATIENCE if left <= few and not glide else o.patience)
         ),
         hasty=hasty,
+        # Few are a matter of the patches, and others would turn over all over the solid.
+        from_afar=not glide and len(stuck_tets(model, x, glide=False)) > few,
         linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
         budget=history.budget,
         note=note,
@@ -320,7 +323,7 @@ def untangle_patches(
             floor=o.floor,
             steps=_PATCH_STEPS,
             enough=lambda left, since: since >= _PATCH_PATIENCE,
-            widest=_WIDEST_OF_PATCH,
+            from_afar=True,
             linear=_core.volume.NewtonOptions(tol=1e-2, max_cg=o.max_cg),
             budget=budget,
         )

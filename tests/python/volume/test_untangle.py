@@ -60,17 +60,40 @@ def test_all_else_goes_the_published_pace(given):
     assert paces(**given) == pytest.approx(0.9)
 
 
+def followed(worst: float, *, alpha: float = 1.0, face: float = 0.0, **given) -> np.ndarray:
+    """Epsilons until patience ends."""
+    newton = Dragging(500, alpha, worst=worst)
+    _continue(
+        newton, np.zeros((1, 3)), face=face, floor=0.02, steps=900,
+        enough=lambda _left, since: since >= 40, linear=None, budget=Budget(60.0), **given,
+    )  # fmt: skip
+    return np.array(newton.epsilons)
+
+
 def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
-    far, near = Dragging(500, worst=-400.0), Dragging(500, worst=-400.0)
-    for newton, widest in ((far, 20.0), (near, 1.0)):
-        _continue(
-            newton, np.zeros((1, 3)), face=0.0, floor=0.02, steps=200, widest=widest,
-            enough=lambda _left, since: since >= 40, linear=None, budget=Budget(60.0),
-        )  # fmt: skip
-    # Nothing is given up while others turn over for it.
-    narrow = np.flatnonzero(np.array(far.epsilons) <= 1.0)[0]
-    assert far.epsilons[0] == 20.0 and len(far.epsilons) == narrow + 40
-    assert near.epsilons[0] == 1.0 and len(near.epsilons) == 40
+    far, near = followed(-400.0, from_afar=True), followed(-400.0)
+    assert far[0] == 20.0 and near[0] == 1.0 and len(near) == 40
+    # More than before are inverted meanwhile: nothing is given up until epsilon is narrow.
+    assert (far > 0.1).sum() + 40 == len(far)
+    # Full steps are hurried down to that, but not where faces glide, nor short ones.
+    pace = far[1:] / far[:-1]
+    assert pace[:5] == pytest.approx(np.sqrt(0.7), abs=0.01)
+    assert pace[-5:] == pytest.approx(np.sqrt(0.9), abs=0.01)
+    for given in ({"alpha": 0.5}, {"face": 1.0}):
+        slow = followed(-400.0, from_afar=True, **given)
+        assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
+
+
+@pytest.mark.parametrize(("share", "afar"), [(0.005, False), (0.02, True)])
+def test_many_inverted_tets_are_brought_back_together_a_few_in_patches(monkeypatch, share, afar):
+    run = run_of(sm.samples.bumpy_torus(6000))
+    n = int(share * run.problem.solid.n_tets)
+    found = []
+    monkeypatch.setattr(untangle, "_continue", lambda *_, from_afar, **__: found.append(from_afar))
+    monkeypatch.setattr(untangle, "stuck_tets", lambda *_, **__: np.arange(n))
+    for given in ({}, {"thorough": True}, {"glide": True}):
+        untangle.untangle_whole(run.history.model, run.x, run.history, **{"glide": False} | given)
+    assert found == [afar, True, False]
 
 
 @pytest.mark.parametrize("amplitude", [1.0, 10.0])
