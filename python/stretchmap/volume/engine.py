@@ -244,12 +244,17 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     A boundary that is going to glide on a mesh gives way before that. On a torus all of it would
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
-    history = run.history
+    history, begin = run.history, run.x
     if not run.resumed:  # else it has been at its end
-        run.x = untangle_whole(history.model, run.x, history, glide=False, hasty=run.hasty).x
+        run.x = untangle_whole(history.model, begin, history, glide=False, hasty=run.hasty).x
+    if run.hasty and run.hopeless:
+        near, inverted = run.x, _inverted(run)
+        run.x = untangle_whole(history.model, begin, history, glide=False, from_afar=True).x
+        if _inverted(run) >= inverted:
+            run.x = near
     if run.hasty and run.hopeless:
         return stuck_tets(history.model, run.x, glide=False)
-    stuck = _patched(run, glide=False)
+    stuck = _patched(run, glide=False, few=_FEW_STUCK if glide else 0)
     if glide and 0 < len(stuck) <= _FEW_STUCK:
         stuck = _patched_gliding(run, stuck)
     if glide and 0 < len(stuck) <= _FEW_STUCK:
@@ -280,7 +285,7 @@ def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
         if run.history.budget.spent:
             break
         run.take(run.problem.halved(crowded_edges(run.problem.solid, left)))
-        left = _patched(run, glide=False)
+        left = _patched(run, glide=False, few=_FEW_STUCK)
         if 0 < len(left) <= _FEW_STUCK:
             left = _patched_gliding(run, left)
     if not len(left):
@@ -289,8 +294,8 @@ def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
     return stuck
 
 
-def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
-    """Untangle patches as long as that helps, and then larger ones; tets that are left."""
+def _patched(run: _Run, *, glide: bool, few: int = 0) -> NDArray[np.intp]:
+    """Untangle patches as long as that helps, and then larger ones if more than a few are left."""
     model, budget = run.history.model, run.history.budget
     stuck = stuck_tets(model, run.x, glide=glide)
     rings = iter(_RINGS)
@@ -305,7 +310,9 @@ def _patched(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         if helped:
             continue
         larger = next(rings, None)
-        if larger is None or (run.hasty and len(stuck) > _WIDELY * len(model.T)):
+        if larger is None or len(stuck) <= few:
+            break
+        if run.hasty and len(stuck) > _WIDELY * len(model.T):
             break
         reach = larger if gained else next(rings, larger)  # all or nothing
     return stuck

@@ -152,6 +152,7 @@ def untangle_whole(
     glide: bool,
     thorough: bool = False,
     hasty: bool = False,
+    from_afar: bool = False,
 ) -> Untangled:
     """Untangle all tets at once, until none or so few are inverted that patches serve better.
 
@@ -167,6 +168,8 @@ def untangle_whole(
         Leave none to the patches.
     hasty : bool
         Leave them all to the patches where steps stay short.
+    from_afar : bool
+        Whether epsilon may be wide to begin with, so that many more turn over and back.
     """
     o = model.options
     newton = model.newton(x, glide=glide, weights=model.roomy_weights)
@@ -192,8 +195,7 @@ def untangle_whole(
             since >= (_FEW_PATIENCE if left <= few and not glide else o.patience)
         ),
         hasty=hasty,
-        # Few are a matter of the patches, and others would turn over all over the solid.
-        from_afar=not glide and len(stuck_tets(model, x, glide=False)) > few,
+        from_afar=from_afar,
         linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
         budget=history.budget,
         note=note,

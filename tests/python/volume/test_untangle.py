@@ -84,16 +84,24 @@ def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
         assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
 
 
-@pytest.mark.parametrize(("share", "afar"), [(0.005, False), (0.02, True)])
-def test_many_inverted_tets_are_brought_back_together_a_few_in_patches(monkeypatch, share, afar):
-    run = run_of(sm.samples.bumpy_torus(6000))
-    n = int(share * run.problem.solid.n_tets)
-    found = []
-    monkeypatch.setattr(untangle, "_continue", lambda *_, from_afar, **__: found.append(from_afar))
-    monkeypatch.setattr(untangle, "stuck_tets", lambda *_, **__: np.arange(n))
-    for given in ({}, {"thorough": True}, {"glide": True}):
-        untangle.untangle_whole(run.history.model, run.x, run.history, **{"glide": False} | given)
-    assert found == [afar, True, False]
+@pytest.mark.parametrize("better", [True, False])
+def test_what_is_hopeless_near_by_is_begun_once_more_from_afar(monkeypatch, better):
+    run = run_of(sm.samples.bumpy_torus(600))
+    run.hasty, begin, done = True, run.x, []
+    n = len(run.problem.solid.T)
+
+    def whole(model, x, history, *, glide, hasty=False, from_afar=False):
+        assert x is begin
+        done.append("afar" if from_afar else "near")
+        return Untangled(np.full(x.shape, 2.0 if from_afar and better else 1.0), 0, -1.0)
+
+    monkeypatch.setattr(engine, "untangle_whole", whole)
+    monkeypatch.setattr(
+        engine, "stuck_tets", lambda model, x, glide: np.arange(0 if x[0, 0] == 2.0 else n)
+    )
+    left = engine._untangle_inside(run, glide=True)
+    assert done == ["near", "afar"]
+    assert (len(left), run.x[0, 0]) == ((0, 2.0) if better else (n, 1.0))
 
 
 @pytest.mark.parametrize("amplitude", [1.0, 10.0])
@@ -189,10 +197,12 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
     def halved():
         return run.problem.solid.n_vertices > begun.n_vertices
 
-    def patched(run, *, glide):
+    def patched(run, *, glide, few=0):
         return np.arange(0 if cured and halved() else stuck)
 
-    def whole(model, x, history, *, glide, thorough=False, hasty=False):
+    def whole(model, x, history, *, glide, thorough=False, hasty=False, from_afar=False):
+        if from_afar:
+            return Untangled(x, stuck, -1.0)
         done.append("thorough" if thorough else "whole")
         return Untangled(x, stuck, -1.0)
 
@@ -235,7 +245,7 @@ def test_a_start_gone_on_with_begins_with_patches(monkeypatch, resumed):
         done.append("thorough" if thorough else "whole")
         return Untangled(x, 300, -1.0)
 
-    def patched(run, *, glide):
+    def patched(run, *, glide, few=0):
         done.append("patches")
         return np.arange(300)
 
@@ -280,11 +290,13 @@ def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck
     run = run_of(sm.samples.bumpy_torus(600))
     run.hasty, done = True, []
 
-    def whole(model, x, history, *, glide, thorough=False, hasty=False):
+    def whole(model, x, history, *, glide, thorough=False, hasty=False, from_afar=False):
+        if from_afar:
+            return Untangled(x, stuck, -1.0)
         done.append("thorough" if thorough else "whole")
         return Untangled(x, stuck, -1.0)
 
-    def patched(run, *, glide):
+    def patched(run, *, glide, few=0):
         done.append("gliding" if glide else "patches")
         return np.arange(stuck)
 
@@ -337,6 +349,11 @@ def test_patches_reach_further_where_they_hardly_help(monkeypatch, left, rings):
     monkeypatch.setattr(engine, "stuck_tets", lambda model, x, glide: np.arange(int(x[0, 0])))
     assert len(engine._patched(run, glide=False)) == (200 if left == 200 else 56)
     assert reached == rings
+    for few, rest in ((55, rings), (200, [two for two in rings if two == 2])):
+        reached.clear()
+        run.x = np.full(run.x.shape, 200.0)
+        engine._patched(run, glide=False, few=few)  # so few are for the boundary to let go
+        assert reached == rest
     reached.clear()
     run.x, run.hasty = np.full(run.x.shape, 200.0), True
     engine._patched(run, glide=False)
