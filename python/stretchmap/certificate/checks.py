@@ -32,6 +32,7 @@ from __future__ import annotations
 
 import math
 import os
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -120,7 +121,7 @@ def certify(
         _positive(found, "image_positive", points, mesh.T, "image")
     else:
         surface, boundary_image = mesh, points
-    _embedded(found, "source_embedded", surface.V, surface.F, "source surface")
+    _source_embedded(found, surface)
     proof = _boundary(found, boundary_image, surface.F, torus, tolerance)
     if isinstance(mesh, TetMesh):
         _volumes(found, points, mesh.T, boundary_image, surface.F)
@@ -193,14 +194,29 @@ def _positive(
 
 def _embedded(
     found: Findings, name: str, V: NDArray[np.float64], F: NDArray[np.int32], what: str
-) -> bool:
-    pairs = _core.certificate.crossing_faces(V, F, MOST_IDS)
-    return found.note(
+) -> None:
+    _note_crossing(found, name, _core.certificate.crossing_faces(V, F, MOST_IDS), what)
+
+
+def _note_crossing(found: Findings, name: str, pairs: NDArray[np.int32], what: str) -> None:
+    found.note(
         name,
         not len(pairs),
         f"the {what} touches or crosses itself: {describe('face pair', pairs)}",
         pairs,
     )
+
+
+# Of the sources, which no map changes, by mesh; many maps of one are certified in turn.
+_crossing: WeakKeyDictionary[TriMesh, NDArray[np.int32]] = WeakKeyDictionary()
+
+
+def _source_embedded(found: Findings, surface: TriMesh) -> None:
+    pairs = _crossing.get(surface)
+    if pairs is None:
+        pairs = _core.certificate.crossing_faces(surface.V, surface.F, MOST_IDS)
+        _crossing[surface] = pairs
+    _note_crossing(found, "source_embedded", pairs, "source surface")
 
 
 def _boundary(

@@ -63,7 +63,7 @@ def boundary_starts(
         Whether the boundary will move. Then a stretch common to all tets is undone first, and the
         maps say so: they do not preserve the areas of the surface as it is.
     budget : Budget, optional
-        None that would take most of what is left is made, but the first.
+        The first may take all of it, none of the others most of what is left.
     progress : Progress or None
 
     Yields
@@ -93,8 +93,9 @@ def boundary_starts(
 def _all_there_are(
     maps: _BoundaryMaps, makers: Iterable[Callable[[], AreaMap | None]], budget: Budget | None
 ) -> Iterator[AreaMap]:
-    """What they make in time; an error is raised only if none makes anything."""
+    """What they make in time, or else the first as it is; an error only if none makes anything."""
     failed, any_made = None, False
+    maps.limit = budget
     for make in makers:
         try:
             found = make()
@@ -109,6 +110,8 @@ def _all_there_are(
                 maps.limit = budget.share(_LONGEST)
     if failed is not None and not any_made:
         raise failed
+    if not any_made:
+        yield maps.first
 
 
 class _BoundaryMaps:

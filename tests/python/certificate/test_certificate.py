@@ -263,6 +263,25 @@ def test_files(tmp_path, solid):
         certify_file(path)
 
 
+def test_of_one_source_many_maps_are_certified_with_one_search_for_crossings(monkeypatch):
+    crossed = samples.solid_torus(600)
+    moved = crossed.V.copy()
+    moved[crossed.boundary_vertices[0]] *= -1.0  # across the hole, through all that is there
+    solids = [samples.solid_torus(600), TetMesh(moved, crossed.T)]
+    search, searched = _core.certificate.crossing_faces, []
+    monkeypatch.setattr(
+        _core.certificate,
+        "crossing_faces",
+        lambda V, F, most: searched.append(V) or search(V, F, most),
+    )
+    for solid, embedded in zip(solids, (True, False), strict=True):
+        searched.clear()
+        found = [certify(solid, crossed.V, torus) for torus in (TORUS, TORUS, None)]
+        assert [c.checks["source_embedded"] for c in found] == 3 * [embedded]
+        assert len({c.ids.get("source_embedded") for c in found}) == 1
+        assert sum(V is solid.surface.V for V in searched) == 1
+
+
 def test_bad_arguments(solid):
     with pytest.raises(ArrayError):
         certify(solid, solid.V[1:])

@@ -114,6 +114,15 @@ def test_one_that_takes_most_of_the_time_left_is_given_up_for_the_next(monkeypat
     assert budget.left <= 0.21  # half went into the first, half of the rest into the last
 
 
+def test_where_there_is_no_time_for_any_the_first_comes_as_it_is():
+    limits = [{"budget": Budget(0.0)}, {}]
+    first, made = (
+        next(boundary_starts(mug(7, 1, 6), VolumeOptions(), glide=True, progress=None, **limit))
+        for limit in limits
+    )
+    assert not first.certificate.certified and made.certificate.certified
+
+
 def test_one_that_is_as_dear_as_all_there_is_is_not_waited_for(monkeypatch, plain):
     bad = twisted(plain, 3.0)
 
