@@ -34,7 +34,7 @@ _LIGHTER = SHAPES[1]  # all the same better than to lose what is far out on a li
 # Times the ratio of the fattest, each with both weights of shape: coarse triangles fold on one, and
 # both sides of a thin wall get stuck in each other on another.
 _LESS_FAT = (1.0, 1.6, 2.5)
-_LONGEST = 0.5  # share of the time left that making another one may take
+_LONGEST = 0.7  # share of the time left that making another one may take
 _LOST = 1e-16  # of its area a face has no more
 # Share of the faces that do not look outward from which on turning them was not seen to succeed
 # where areas are equal (from 0.0317 on it failed, up to 0.0268 it did not).
