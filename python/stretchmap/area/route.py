@@ -87,6 +87,15 @@ class EqualAreas:
             self._balanced[shape] = balance_areas(self.level, shape, self._progress)
         return self._balanced[shape]
 
+    def shaped(self, shape: float) -> None:
+        """Make those with that weight of shape, if nearly equal areas have been made before.
+
+        From there it is half the way to the same minimum, where a conformal map is far from both.
+        """
+        if 0.0 in self._balanced and shape not in self._balanced:
+            level = dataclasses.replace(self.level, turns=self._balanced[0.0][0])
+            self._balanced[shape] = balance_areas(level, shape, self._progress)
+
     def eased(self, shape: float, turns: NDArray[np.float64]) -> _Turns:
         """Others moved on by Newton steps with that weight of shape; with records."""
         level = dataclasses.replace(self.level, turns=turns)

@@ -220,6 +220,8 @@ class _BoundaryMaps:
         return len(_core.certificate.torus_graph(found.image, self.surface.F, found.torus.R).bad)
 
     def _chart(self, ratio: Ratio | float, shape: float = 0.0) -> AreaMap:
+        if shape:
+            self.equal.shaped(shape)
         steps = Steps(0, _TOL, math.inf)
         route = Route(self.phase, ratio, _SEM_STEPS, "none", steps, shape)
         return charted(route, self.equal, self.conformal, self.progress)

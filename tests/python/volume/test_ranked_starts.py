@@ -115,6 +115,18 @@ def test_one_that_takes_most_of_the_time_left_is_given_up_for_the_next(monkeypat
     assert budget.left <= 0.12
 
 
+def test_kept_shapes_are_made_from_equal_areas_and_end_where_they_do_without():
+    maps = boundary_starts_module._BoundaryMaps(mug(9, 1, 9).surface, VolumeOptions(), None)
+    areas, _ = maps.equal.balanced(0.0)
+    _, all_steps = balance_areas(maps.equal.level, 100.0, None)
+    found = maps._chart(2.0, 100.0)
+    _, steps = maps.equal.balanced(100.0)
+    begun = dataclasses.replace(maps.equal.level, turns=areas)
+    first = balance_areas(begun, 100.0, None, most=1)[1][0]
+    assert steps[0].energy == first.energy and found.history[-1] == steps[-1]
+    assert steps[-1].energy == pytest.approx(all_steps[-1].energy, rel=0.01)
+
+
 def test_where_there_is_no_time_for_any_the_first_comes_as_it_is():
     limits = [{"budget": Budget(0.0)}, {}]
     first, made = (
