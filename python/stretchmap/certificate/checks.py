@@ -32,7 +32,6 @@ from __future__ import annotations
 
 import math
 import os
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -121,7 +120,8 @@ def certify(
         _positive(found, "image_positive", points, mesh.T, "image")
     else:
         surface, boundary_image = mesh, points
-    _source_embedded(found, surface)
+    # Of one mesh many maps are certified in turn.
+    _embedded(found, "source_embedded", surface.crossing_faces, "source surface")
     proof = _boundary(found, boundary_image, surface.F, torus, tolerance)
     if isinstance(mesh, TetMesh):
         _volumes(found, points, mesh.T, boundary_image, surface.F)
@@ -192,31 +192,13 @@ def _positive(
     found.note(name, not len(bad), f"{what} volume not positive: {describe('tet', bad)}", bad)
 
 
-def _embedded(
-    found: Findings, name: str, V: NDArray[np.float64], F: NDArray[np.int32], what: str
-) -> None:
-    _note_crossing(found, name, _core.certificate.crossing_faces(V, F, MOST_IDS), what)
-
-
-def _note_crossing(found: Findings, name: str, pairs: NDArray[np.int32], what: str) -> None:
+def _embedded(found: Findings, name: str, pairs: NDArray[np.int32], what: str) -> None:
     found.note(
         name,
         not len(pairs),
         f"the {what} touches or crosses itself: {describe('face pair', pairs)}",
         pairs,
     )
-
-
-# Of the sources, which no map changes, by mesh; many maps of one are certified in turn.
-_crossing: WeakKeyDictionary[TriMesh, NDArray[np.int32]] = WeakKeyDictionary()
-
-
-def _source_embedded(found: Findings, surface: TriMesh) -> None:
-    pairs = _crossing.get(surface)
-    if pairs is None:
-        pairs = _core.certificate.crossing_faces(surface.V, surface.F, MOST_IDS)
-        _crossing[surface] = pairs
-    _note_crossing(found, "source_embedded", pairs, "source surface")
 
 
 def _boundary(
@@ -227,9 +209,14 @@ def _boundary(
     tolerance: float,
 ) -> str:
     """Embeddedness of the boundary image; returns the proof in words."""
-    if torus is None:
-        _embedded(found, "boundary_embedded", image, F, "boundary image")
+
+    def not_crossing() -> str:
+        pairs = _core.certificate.crossing_faces(image, F, MOST_IDS)
+        _embedded(found, "boundary_embedded", pairs, "boundary image")
         return "the boundary image does not cross itself (exact tests)"
+
+    if torus is None:
+        return not_crossing()
     graph = _core.certificate.torus_graph(image, F, torus.R)
     u, v, s = torus.coordinates(image)
     winding = graph.winding
@@ -243,9 +230,8 @@ def _boundary(
             f"the boundary image is folded: {describe('face', flipped)}",
             flipped,
         )
-        _embedded(found, "boundary_embedded", image, F, "boundary image")
+        proof = not_crossing()
         winding = float(chart_areas(F, np.stack([u, v], axis=1)).sum()) / TWO_PI**2
-        proof = "the boundary image does not cross itself (exact tests)"
     else:
         proof = "the boundary image is a graph over the torus, covered once"
     found.quantities["winding"] = round(winding)

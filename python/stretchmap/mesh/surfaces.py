@@ -19,6 +19,7 @@ __all__ = ["TriMesh"]
 
 # Defects that leave a surface without a genus.
 _NO_GENUS = ("nonmanifold_edges", "nonmanifold_vertices", "border_edges", "not_orientable")
+_MOST_PAIRS = 1000  # of faces that cross: one does as much harm as all
 
 
 class TriMesh(Mesh):
@@ -131,6 +132,14 @@ class TriMesh(Mesh):
     def volume(self) -> float:
         """Signed enclosed volume, positive with outward normals; meaningless with a border."""
         return float(_core.mesh.enclosed_volume(self.V, self.F))
+
+    @cached_property
+    def crossing_faces(self) -> NDArray[np.int32]:
+        """(k, 2) pairs of faces that meet beyond the vertices they share, the first thousand.
+
+        Decided by exact tests.
+        """
+        return read_only(_core.certificate.crossing_faces(self.V, self.F, _MOST_PAIRS))
 
     @property
     def n_components(self) -> int:

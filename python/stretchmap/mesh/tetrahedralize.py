@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
 from ..base.arrays import describe
 from ..base.options import real
 from ..errors import MissingDependencyError, SelfIntersectionError, SolverError
@@ -21,8 +20,6 @@ from .given import as_surface
 from .meshes import TetMesh, TriMesh
 
 __all__ = ["tetrahedralize"]
-
-_MOST_PAIRS = 1000
 
 
 def tetrahedralize(
@@ -115,9 +112,8 @@ def _require_same_surface(solid: TetMesh, surface: TriMesh) -> None:
 
 
 def _require_no_crossing(surface: TriMesh) -> None:
-    pairs = _core.certificate.crossing_faces(surface.V, surface.F, _MOST_PAIRS)
-    if len(pairs):
-        ids = np.unique(pairs)
+    ids = np.unique(surface.crossing_faces)
+    if len(ids):
         raise SelfIntersectionError(
             f"the surface crosses itself at {describe('face', ids)} and cannot be filled with "
             "tets; repair it there, or let stretchmap prepare do so",
