@@ -1,6 +1,7 @@
 #include "area/facing.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "area/cross.hpp"
 
@@ -104,6 +105,17 @@ Jet corner_facing(const TorusPoint (&p)[3], int k, bool second) {
   own(1, 1) = -area.dot(normal);
   jet.hessian.block<2, 2>(2 * k, 2 * k) += own;
   return jet;
+}
+
+double least_facing(const TorusPoint (&p)[3], const Torus& torus) {
+  const Vector3d area = area_vector(p);
+  if (inside(p, area.head<2>()))
+    return (area.dot(p[0].point) - torus.R * area.head<2>().norm()) / torus.r;
+  double least = std::numeric_limits<double>::infinity();
+  for (const TorusPoint& corner : p)
+    least =
+        std::min(least, area.dot(corner.tangent.col(0).cross(corner.tangent.col(1)).normalized()));
+  return least;
 }
 
 Facing facing(const TorusPoint (&p)[3], const Torus& torus, bool second) {

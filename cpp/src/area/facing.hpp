@@ -18,6 +18,9 @@ struct Facing {
   Jet least;  // over the whole face
 };
 
+// Its `least` alone, without derivatives.
+double least_facing(const TorusPoint (&p)[3], const Torus& torus);
+
 Facing facing(const TorusPoint (&p)[3], const Torus& torus, bool second);
 
 }  // namespace stretchmap::area

@@ -18,6 +18,10 @@ namespace {
 // ratios takes ever more steps, with none of it the steps get short.
 constexpr double kModelCurvature = 0.25;
 
+// Share of its own area up to which a face has to look outward for the barrier to leave it alone:
+// of the faces of a map that is nearly done few have less.
+constexpr double kFacing = 0.5;
+
 // Sum of half the cotangent times the squared opposite edge: |t| (s1^2 + s2^2).
 Jet dirichlet_jet(const TorusPoint (&p)[3], const Eigen::Vector3d& cotan, bool second) {
   Jet jet;
@@ -150,15 +154,23 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
   add_areas(area, scale * size, weights.area * share, curvature, second, sum);
   if (weights.chart > 0.0) add_barrier(chart, size, weights.chart * share, second, sum);
   if (weights.facing > 0.0) {
-    const Facing outward = facing(p, problem.torus(), second);
-    if (weights.epsilon <= 0.0 && !(outward.least.value > 0.0)) {
+    const double least = least_facing(p, problem.torus());
+    if (weights.epsilon <= 0.0 && !(least > 0.0)) {
       sum.value = std::numeric_limits<double>::infinity();
       return sum;
     }
-    const double weight = 0.25 * weights.facing * share;
-    add_facing(outward.least, size, weight, weights.epsilon, second, sum);
-    for (const Jet& corner : outward.corner)
-      add_facing(corner, size, weight, weights.epsilon, second, sum);
+    if (weights.epsilon > 0.0 || least < kFacing * size) {
+      const Facing outward = facing(p, problem.torus(), second);
+      const double weight = 0.25 * weights.facing * share;
+      const auto add = [&](const Jet& jet) {
+        if (weights.epsilon > 0.0)
+          add_facing(jet, size, weight, weights.epsilon, second, sum);
+        else if (jet.value < kFacing * size)
+          add_facing(jet, kFacing * size, weight, 0.0, second, sum);
+      };
+      add(outward.least);
+      for (const Jet& corner : outward.corner) add(corner);
+    }
   }
   if (weights.shape > 0.0)
     add_shape(dirichlet_jet(p, problem.reference.cotan.row(f), second), area, weights.shape * share,
@@ -207,7 +219,7 @@ double least_facing(const GlideProblem& problem, const Points2Ref& angles) {
   return least_of(static_cast<Index>(problem.chart.faces.rows()), far, [&](Index f) {
     TorusPoint p[3];
     for (int k = 0; k < 3; ++k) p[k] = points[problem.chart.faces(f, k)];
-    return facing(p, torus, false).least.value / problem.reference.areas(f);
+    return least_facing(p, torus) / problem.reference.areas(f);
   });
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -60,6 +62,42 @@ bool segment_meets_triangle(const Point& p, const Point& q, const Triangle& t) {
     right = right || side < 0;
   }
   return !(left && right);
+}
+
+// Whether a plane proves that the triangles have no point in common but corner 0, if that is
+// shared. In a hurry: pieces of one flat face, of which refined meshes have many, and needles whose
+// boxes overlap are kept from the exact predicates. Planes are along the triangles or upright on an
+// edge of one; that rounding puts them a little off does not matter, that of the heights is
+// bounded.
+bool apart(const Triangle& p, const Triangle& q, bool shared) {
+  constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();
+  constexpr double kUnderflow = 1e-290;  // heights below it have lost digits
+  const Point origin = p[0];
+  const auto splits = [&](const Point& up) {
+    double low[2], high[2];
+    for (const Triangle* t : {&p, &q}) {
+      const int side = t == &q;
+      low[side] = std::numeric_limits<double>::infinity();
+      high[side] = -low[side];
+      for (int k = shared; k < 3; ++k) {
+        const Point way = (*t)[k] - origin;
+        const double height = up.dot(way);
+        const double error = kRounding * up.cwiseAbs().dot(way.cwiseAbs()) + kUnderflow;
+        if (!std::isfinite(height + error)) return false;
+        low[side] = std::min(low[side], height - error);
+        high[side] = std::max(high[side], height + error);
+      }
+    }
+    if (!shared) return high[0] < low[1] || high[1] < low[0];
+    return (high[0] < 0.0 && low[1] > 0.0) || (high[1] < 0.0 && low[0] > 0.0);
+  };
+  for (const Triangle* t : {&p, &q}) {
+    const Point normal = ((*t)[1] - (*t)[0]).cross((*t)[2] - (*t)[0]);
+    if (!shared && splits(normal)) return true;
+    for (int k = 0; k < 3; ++k)
+      if (splits(normal.cross((*t)[(k + 1) % 3] - (*t)[k]))) return true;
+  }
+  return false;
 }
 
 // Two triangles on the common edge (a, b): they meet beyond it when folded onto each other.
@@ -162,6 +200,7 @@ bool triangles_meet(const PointsRef& points, const Triple& a, const Triple& b) {
   const Triangle p = corners(s), q = corners(t);
   if (shared == 3) return true;
   if (shared == 2) return folded(p[0], p[1], p[2], q[2]);
+  if (apart(p, q, shared == 1)) return false;
   if (shared == 1) {
     return segment_meets_triangle(p[1], p[2], q) || segment_meets_triangle(q[1], q[2], p);
   }

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import time
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,22 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress
 from ..base.torus import TWO_PI, Torus
+from ..maps.history import IterationRecord
 from ..mesh.halved_faces import SurfaceRefinement, halve_edges
 from ..mesh.surfaces import TriMesh
-from .balance import balance_areas
 from .coarse import Level, forms_of
-from .finish import Pace, Steps, cut_short, finish_areas, unfold_faces, worth_rings
+from .finish import (
+    Pace,
+    Steps,
+    approach_areas,
+    cut_short,
+    finish_areas,
+    unfold_faces,
+    worth_rings,
+)
 from .flat import start_angles
 from .route import Made
-from .sem import minimize_stretch
-from .work import Work
+from .work import RINGS, Work
 
 _log = logging.getLogger("stretchmap")
 
@@ -33,14 +41,15 @@ _SAG = 1.0  # most sag of an edge, over the heights its faces are to have above 
 _FAR, _MANY = 2.0, 0.005  # more than this share of the edges with more sag than that: too coarse
 _SLIVER = 3.0  # times the median: longer faces are given the height they would have at that
 _GROWTH, _SPARE = 2.5, 12_000  # most faces: so many times those of the input, and so many more
+_BENT = 0.5  # least share of its area that a face may keep when the flat chart is bent
 _PASSES = 14
-_RESHAPING = 12  # Newton steps in the chart once edges are halved
+_APPROACH = 10, 10, 10  # most steps towards areas, edges that sag too much halved after each
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
-_STEPS = 30  # of each round; fewer are not worth it
+_LEAST_STEPS = 10  # from where areas are nearly right, however little work is left
+_STEPS = 20  # of each round; fewer are not worth it
 _UNFOLDING = (1 / 4, (5, 25))  # a share of the work, and steps, until no face is folded
-_FEW_UNFOLDING = 10  # such steps that mostly suffice
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -76,6 +85,39 @@ class Finer:
     def of(cls, level: Level, angles: NDArray[np.float64], ratio: float) -> Finer:
         """A surface as it is."""
         return cls(level, angles, ratio, SurfaceRefinement.of(level.surface))
+
+    @classmethod
+    def wrapped(cls, level: Level, turns: NDArray[np.float64], phase: float, ratio: float) -> Finer:
+        """A surface wrapped round the torus from a flat chart."""
+        turns = np.column_stack([turns[:, 0], turns[:, 1] + phase])
+        return cls.of(level, TWO_PI * turns, ratio)._bent()
+
+    def _bent(self) -> Finer:
+        """With s, the second coordinate of the flat chart so far, bent into the angle v.
+
+        Large faces can turn over or lose their areas. Edges of theirs are halved in the flat chart,
+        which nothing folds, so that only short edges are bent; where that takes too many faces, s
+        is bent less.
+        """
+        flat = self
+        for _ in range(_PASSES):
+            u, s = flat.angles.T
+            v = _core.area.angle_from_equal_area(s, 1.0 / flat.ratio)
+            bent = np.column_stack([u, v])
+            chart, faces = flat.level.chart, flat.level.surface.F
+            density = 1.0 + np.cos(v)[faces].mean(axis=1) / flat.ratio
+            areas = density * _core.area.turn_areas(chart, bent / TWO_PI)
+            over = ~(areas > _BENT * _core.area.turn_areas(chart, flat.angles / TWO_PI))
+            if not over.any():
+                return replace(flat, angles=bent)
+            i, j = flat.level.surface.edges.T
+            span = np.abs(s[j] - s[i] + TWO_PI * flat.level.forms[1])
+            marked = flat.largest_in(np.flatnonzero(over), span)
+            if flat.too_many(marked):
+                break
+            flat = flat.halved(marked)
+        angles = start_angles(flat.level.chart, flat.angles / TWO_PI, 0.0, flat.ratio)
+        return replace(flat, angles=angles)
 
     @property
     def image(self) -> NDArray[np.float64]:
@@ -116,45 +158,62 @@ class Finer:
         finer = Level.of(done.surface, angles / TWO_PI, forms, level.aspect)
         return Finer(finer, angles, self.ratio, self.added.after(done))
 
-    def fitted(self) -> Finer | None:
-        """With edges halved until none sags too much; None if that takes too many faces."""
+    def fitted(self, sag: float = _SAG) -> Finer | None:
+        """With edges halved until none sags too much; None if that takes too many faces.
+
+        And until no face looks inward, if that does not: what lies in a chart without folds needs
+        but edges short enough.
+        """
         finer = self
         for _ in range(_PASSES):
-            marked = finer.sags() > _SAG
+            marked = finer.sags() > sag
             if not marked.any():
                 break
             if finer.too_many(marked):
                 return None
             finer = finer.halved(marked)
+        return finer.outward()
+
+    def outward(self) -> Finer:
+        """With the edges halved that sag most in faces that look inward, while there are any."""
+        finer = self
+        for _ in range(_PASSES):
+            inward = _core.certificate.torus_graph(
+                finer.image, finer.level.chart.faces, finer.ratio
+            ).bad
+            marked = finer.largest_in(inward, finer.sags())
+            if not marked.any() or finer.too_many(marked):
+                break
+            finer = finer.halved(marked)
         return finer
 
-    def evened(self, sem_iter: int, progress: Progress | None) -> Finer:
-        """With areas made equal in the chart, which coarse faces had not allowed."""
-        level = self._in_chart()
-        if level is None:
-            return self
-        return self._with(level, minimize_stretch(level, sem_iter, progress)[0])
+    def largest_in(
+        self, faces: NDArray[np.integer[Any]], of_edges: NDArray[np.float64], least: float = 0.0
+    ) -> NDArray[np.bool_]:
+        """(e,) whether an edge has the largest number of a face's edges, and more than ``least``.
 
-    def reshaped(self, progress: Progress | None, work: Work) -> Finer:
-        """With Newton steps in the chart, which give faces back shapes that areas had cost them."""
-        level = self._in_chart()
-        if level is None:
-            return self
-        turns, records = balance_areas(level, 0.0, progress, most=_RESHAPING)
-        work.spend_in_chart(len(records), level.surface.n_faces)
-        return self._with(level, turns)
+        Of each of the faces.
+        """
+        edge = self.level.surface.topology.edge.reshape(-1, 3)[faces]
+        largest = edge[np.arange(len(edge)), of_edges[edge].argmax(axis=1)]
+        marked = np.zeros(len(of_edges), bool)
+        marked[largest[of_edges[largest] > least]] = True
+        return marked
 
-    def _in_chart(self) -> Level | None:
-        """The level over the flat chart of equal areas; None where faces are folded there."""
-        u, v = self.angles.T
-        turns = np.column_stack([u, v + np.sin(v) / self.ratio]) / TWO_PI
-        if not (_core.area.turn_areas(self.level.chart, turns) > 0.0).all():
-            return None
-        return Level.of(self.level.surface, turns, self.level.forms, self.level.aspect)
-
-    def _with(self, level: Level, turns: NDArray[np.float64]) -> Finer:
-        angles = start_angles(level.chart, turns, 0.0, self.ratio)
-        return Finer(level, angles, self.ratio, self.added)
+    def approached(
+        self, progress: Progress | None, work: Work
+    ) -> tuple[Finer, Pace, list[IterationRecord]]:
+        """With areas nearly right, edges that sag too much meanwhile halved, too; pace, records."""
+        finer, history = self, []
+        for most in _APPROACH:
+            newton, n_faces = finer.newton(), finer.level.surface.n_faces
+            records, pace = approach_areas(newton, min(most, work.steps(n_faces)), progress)
+            work.spend_on_approach(len(records), n_faces)
+            history += records
+            finer = replace(finer, angles=newton.angles)
+            finer = finer.fitted() or finer.outward()
+            work.spend_on_fitting(finer.level.surface.n_faces)
+        return finer, pace, history
 
     def newton(self) -> _core.area.SurfaceNewton:
         """Steps from here on."""
@@ -169,14 +228,13 @@ class Finer:
 
     def where_off(self, tol: float) -> Finer | None:
         """With the edges halved that sag most in faces whose areas are off; None without any."""
-        surface = self.level.surface
-        edge = surface.topology.edge.reshape(-1, 3)
-        own = edge[np.abs(self.ratios() - 1.0) > _OFF * tol]
-        sags = self.sags()
-        worst = own[np.arange(len(own)), sags[own].argmax(axis=1)]
-        marked = np.zeros(len(sags), bool)
-        marked[worst[sags[worst] > _LITTLE]] = True
-        return self.halved(marked) if marked.any() and not self.too_many(marked) else None
+        off = np.flatnonzero(np.abs(self.ratios() - 1.0) > _OFF * tol)
+        marked = self.largest_in(off, self.sags(), _LITTLE)
+        return self.halved(marked).outward() if marked.any() and not self.too_many(marked) else None
+
+    def too_coarse(self) -> bool:
+        """Whether so many edges sag so much that the surface needs more before anything else."""
+        return bool((self.sags() > _FAR).mean() > _MANY)
 
     @property
     def share(self) -> float:
@@ -187,11 +245,6 @@ class Finer:
         """Whether halving these edges, too, would take more faces than may be."""
         n_faces = len(self.added.parent_face)
         return n_faces + 2 * int(marked.sum()) > _GROWTH * n_faces * self.share + _SPARE
-
-
-def too_coarse(level: Level, angles: NDArray[np.float64], ratio: float) -> bool:
-    """Whether so many edges sag so much that the surface needs more before anything else."""
-    return bool((Finer.of(level, angles, ratio).sags() > _FAR).mean() > _MANY)
 
 
 def mapped_finer(
@@ -210,44 +263,52 @@ def mapped_finer(
     """
     clock = time.perf_counter()
     error, best = np.inf, None if finer.added.n_split else (made, finer)
-    history, idle = list(made.history), 0
+    history, idle, at_once = list(made.history), 0, finer.added.n_split > 0
     most_unfolding = int(np.clip(_UNFOLDING[0] * work.left, *_UNFOLDING[1]))
 
-    def begun(finer: Finer) -> _core.area.SurfaceNewton | None:
-        """Steps from there on, if they can be afforded and lead to no folded face."""
-        newton, n_faces = finer.newton(), finer.level.surface.n_faces
-        folded = not newton.least_facing() > 0.0
-        if work.steps(n_faces) - folded * _FEW_UNFOLDING < _STEPS:
+    def begun(finer: Finer, least: int) -> tuple[Finer, Pace] | None:
+        """From where steps go on, if so many can be afforded and lead to no folded face."""
+        if work.steps(finer.level.surface.n_faces) < least:
             return None
-        unfolding = unfold_faces(newton, most_unfolding, progress)
-        work.spend(len(unfolding), n_faces)
-        history.extend(unfolding)
-        return newton if newton.least_facing() > 0.0 else None
+        finer, pace, records = finer.approached(progress, work)
+        history.extend(records)
+        newton, n_faces = finer.newton(), finer.level.surface.n_faces
+        if not newton.least_facing() > 0.0:
+            unfolding = unfold_faces(newton, most_unfolding, progress)
+            work.spend(len(unfolding), n_faces)
+            history.extend(unfolding)
+            if not newton.least_facing() > 0.0:
+                return None
+            finer = replace(finer, angles=newton.angles)
+        return finer, pace
 
     last, reason, pace = False, made.reason, Pace(_HEAVY)
     for round_ in range(_ROUNDS + 1):
-        at_once = round_ == 0 and finer.added.n_split > 0
-        # What the steps on a surface have made good so far wants no more vertices.
-        enough = round_ == 0 and float(finer.ratios().std()) <= wanted
-        halved = finer if at_once else None if enough else finer.where_off(steps.tol)
-        newton = None if halved is None else begun(halved)
-        if newton is not None:
-            assert halved is not None
-            finer, last, pace = halved, at_once, Pace() if at_once else Pace(_HEAVY)
-        elif not last and cut_short(reason):
-            newton, last = finer.newton(), True
+        first = round_ == 0 and at_once
+        # What the steps on a surface have made good wants no more vertices.
+        enough = not first and float(finer.ratios().std()) <= wanted
+        halved = finer if first else None if enough else finer.where_off(steps.tol)
+        start = None if halved is None else begun(halved, 0 if first else _STEPS)
+        if start is not None:
+            finer, pace = start
+        elif cut_short(reason) and not last and work.steps(finer.level.surface.n_faces):
+            last = True
         else:
             break
+        newton = finer.newton()
         n_faces = finer.level.surface.n_faces
-        most = min(work.steps(n_faces) if last else _STEPS, steps.max_iter)
+        affordable = work.steps(n_faces)
+        with_rings = rings and affordable >= _LEAST_STEPS + RINGS
+        most = max(affordable - with_rings * RINGS, _LEAST_STEPS)
+        most = min(most if last else min(most, _STEPS), steps.max_iter)
         records, converged, reason = finish_areas(
-            newton, rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
+            newton, with_rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
         )
         work.spend(len(records), n_faces)
         history += records
         finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
         measured = newton.measures()
-        if rings and worth_rings(measured, steps.tol):
+        if with_rings and worth_rings(measured, steps.tol):
             work.spend_on_rings(n_faces)
         _log.info("%d edges halved: face SD %.2e", finer.added.n_split, measured.face_std)
         before, now = error, measured.face_std if measured.flips == 0 else np.inf
@@ -255,7 +316,7 @@ def mapped_finer(
             what = Made(newton.angles, made.phase, made.ratio, [], converged, reason)
             error, best = now, (what, finer)
         idle = 0 if now <= _GAIN * before else idle + 1
-        if error <= wanted or idle == _IDLE:
+        if (error <= wanted and not cut_short(reason)) or idle == _IDLE:
             break
     if best is None:
         return None

@@ -21,6 +21,8 @@ _SHAPE = 0.1
 _CHART = 1.0
 _FACING = 1.0
 _GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
+_LIGHT = 4.0**3  # more of it from afar lets faces that are too coarse stand up from the torus
+_NEAR = 0.1  # face SD up to which steps may let faces look inward
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
 _AT_REST, _MOST_DONE = "energy at rest", "most steps done"
 _STALLED = 3  # steps in a row without any length end the iteration
@@ -93,7 +95,7 @@ def unfold_faces(
         if facing > 0.0:
             break
         epsilon = min(max(-_EPSILON * facing, _LEAST_EPSILON), _MOST_EPSILON)
-        taken = newton.step(_weights(1.0, _FACING, epsilon))
+        taken = newton.step(_weights(1.0, _FACING, _SHAPE, epsilon))
         history.append(_record("untangle", iteration + 1, taken, newton.measures(), start))
         report(progress, "area", iteration, steps, flips=history[-1].flips)
         short = short + 1 if taken.step < _SHORT else 0
@@ -130,6 +132,27 @@ class Steps:
         return replace(self, tol=_ROUGH * self.tol)
 
 
+def approach_areas(
+    newton: _core.area.SurfaceNewton, most: int, progress: Progress | None
+) -> tuple[list[IterationRecord], Pace]:
+    """Newton steps until areas are nearly right, whichever way faces look meanwhile; their pace.
+
+    From afar the barrier against faces that look inward leaves but short steps.
+    """
+    start = time.perf_counter()
+    history: list[IterationRecord] = []
+    pace, shape, at_rest = Pace(), _shape_weight(newton), _rest()
+    while len(history) < most and newton.measures().face_std > _NEAR:
+        taken = newton.step(_weights(pace.weight, 0.0, shape))
+        if taken.step >= _FULL_STEP:
+            pace.weight = min(pace.weight * _GROWTH, _LIGHT)
+        history.append(_record("approach", len(history) + 1, taken, newton.measures(), start))
+        report(progress, "area", len(history), most, face_std=history[-1].element_std)
+        if at_rest(taken):
+            break
+    return history, pace
+
+
 def finish_areas(
     newton: _core.area.SurfaceNewton,
     rings: bool,
@@ -148,12 +171,13 @@ def finish_areas(
     worst = _MARGIN * tol if pace.prolonged else tol
     weight, least, heaviest = pace.weight, math.inf, _MOST_WEIGHT**steps.balance
     barrier = _FACING if newton.least_facing() > 0.0 else 0.0
+    shape = _shape_weight(newton) if steps.balance == 1.0 else _SHAPE
     taken = None
     at_rest = _rest()
     reason = _MOST_DONE
     for iteration in range(steps.max_iter + 1):
         if iteration:
-            taken = newton.step(_weights(weight, barrier))
+            taken = newton.step(_weights(weight, barrier, shape))
             if taken.step >= _FULL_STEP:
                 weight = min(weight * _GROWTH, heaviest)
         measured = newton.measures()
@@ -170,7 +194,7 @@ def finish_areas(
             break
     if steps.balance < 1.0:
         return history, reason == _AT_REST and history[-1].flips == 0, reason
-    last = _weights(min(weight, _RING_WEIGHT), barrier)
+    last = _weights(min(weight, _RING_WEIGHT), barrier, shape)
     # Steps that are best for the faces, too, cost as much as three Newton steps each.
     fewest = 0 if pace.prolonged else _BEST_STEPS if _within(measured, _GOOD * tol) else 1
     rings = rings and worth_rings(measured, tol)
@@ -209,10 +233,21 @@ def _rest() -> Callable[[_core.area.NewtonStep], bool]:
     return at_rest
 
 
-def _weights(area: float, facing: float, epsilon: float = 0.0) -> _core.area.SurfaceWeights:
+def _weights(
+    area: float, facing: float, shape: float, epsilon: float = 0.0
+) -> _core.area.SurfaceWeights:
     """The weight of the areas is one, that of the rest falls as theirs is to grow."""
-    shape, chart, facing = _SHAPE / area, _CHART / area, facing / area
+    shape, chart, facing = shape / area, _CHART / area, facing / area
     return _core.area.SurfaceWeights(shape=shape, chart=chart, facing=facing, epsilon=epsilon)
+
+
+def _shape_weight(newton: _core.area.SurfaceNewton) -> float:
+    """With which shapes cost no more than they do where the mean angle distortion is 2.
+
+    On long limbs and round small handles shapes are lost whatever is done; in full they would
+    outweigh the areas for most of the steps.
+    """
+    return _SHAPE / max(newton.measures().angle_mean - 1.0, 1.0)
 
 
 def _ended(

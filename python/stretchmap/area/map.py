@@ -24,9 +24,9 @@ from ..maps.history import IterationRecord
 from ..mesh.given import as_surface, require_same_mesh
 from ..mesh.halved_faces import SurfaceRefinement
 from .coarse import Level, levels
-from .finer import Finer, goal, mapped_finer, too_coarse
+from .finer import Finer, goal, mapped_finer
 from .finish import Steps, cut_short, finish_areas, unfolded
-from .flat import start_angles, unfolded_turns
+from .flat import unfolded_turns
 from .result import AreaMap
 from .route import EqualAreas, Finish, Made, Route, best_turns, follow
 from .search import Ratio, search_phase
@@ -43,8 +43,10 @@ _MOST_TURNS = 1e3  # a phase may have
 # Weights of shape in the chart where equal areas leave faces folded: few edges round a branch span
 # so much of the torus then that what lies between two rounds of them is cut off.
 SHAPES = (1.0, 10.0, 100.0, 1e3)
-# The same where that takes too many faces of a finer surface.
-_EASED = (0.3, 1.0)
+# The same where the surface is to become finer. Its areas are far from equal in such a chart, so
+# edges are halved for good only once they are nearly right: until then up to that sag is left.
+_EASED = (0.1, 0.3, 1.0)
+_COARSELY = 1.5
 
 
 @takes_threads
@@ -230,31 +232,26 @@ def _finer_at_once(
 ) -> AreaMap | None:
     """The map of a finer surface, if this one is too coarse for its place in the chart.
 
-    Where that takes too many faces or leaves some folded, from charts that keep shapes more.
+    From a chart eased towards shapes: in one where areas alone count, faces can be needles by the
+    thousand. Where that takes too many faces or leaves some folded, from charts eased further.
     """
     clock = time.perf_counter()
     level = equal.level
     turns, (phase, ratio, _), records = best_turns(route, equal)
     work.spend_in_chart(sum(record.stage == "balance" for record in records))
-    angles = start_angles(level.chart, turns, phase, ratio)
-    if not too_coarse(level, angles, ratio):
+    if not Finer.wrapped(level, turns, phase, ratio).too_coarse():
         return None
-    for shape in (0.0, *_EASED):
-        if shape:
-            turns, more = equal.eased(shape, turns)
-            records = records + more
-            work.spend_in_chart(len(more))
-            given = (route.phase, route.ratio)
-            phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
-            angles = start_angles(level.chart, turns, phase, ratio)
-        work.spend_on_fitting()
-        finer = Finer.of(level, angles, ratio).fitted()
-        if finer is not None and not shape:
-            evened = finer.evened(route.sem_iter, progress)
-            finer = evened.reshaped(progress, work).fitted() or evened.fitted()
+    for shape in _EASED:
+        turns, more = equal.eased(shape, turns)
+        records = records + more
+        work.spend_in_chart(len(more))
+        given = (route.phase, route.ratio)
+        phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
+        finer = Finer.wrapped(level, turns, phase, ratio).fitted(_COARSELY)
+        work.spend_on_fitting((finer.level.surface if finer else level.surface).n_faces)
         if finer is not None:
             seconds = {"sem": time.perf_counter() - clock}
-            made = Made(angles, phase, ratio, records, seconds=seconds)
+            made = Made(finer.angles, phase, ratio, records, seconds=seconds)
             found = _finer(route, finer, made, progress, torus, work)
             if found is not None:
                 return found

@@ -1,16 +1,26 @@
-"""How much work a map may take: Newton steps, each counted as one on the surface given."""
+"""How much work a map may take: Newton steps on surfaces of various sizes."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..mesh.surfaces import TriMesh
 
-_STEPS, _SMALL = 150.0, 7.2e5  # so many, or as many as make so many faces on a small surface
+# In units of what a face adds to a step where elimination costs nothing: so many a face of the
+# surface given, and no fewer than those. Half a millisecond a face where a unit takes a
+# microsecond.
+_EACH, _LEAST = 560.0, 2.3e6
+_EVEN = 2_000.0  # faces where elimination takes as long as the rest of a step; its share grows
 _UNREFINED = 40  # steps where edges can be halved after them
-# Steps that others take as long as: one in the flat chart, halving edges until few sag, and rings
-# made exact.
-_CHART, _FITTING, _RINGS = 0.4, 4.0, 3.0
+# Steps that others take as long as: one in the flat chart, one without a barrier against faces that
+# look inward, halving edges until few sag, and rings made exact.
+_CHART, _LOOSE, _FITTING, RINGS = 0.6, 0.9, 3, 8
+
+
+def _cost(n_faces: int) -> float:
+    """Of a step: elimination by nested dissection grows as the power 3/2 of the faces."""
+    return n_faces * (1.0 + math.sqrt(n_faces / _EVEN))
 
 
 @dataclass
@@ -33,26 +43,31 @@ class Work:
     @classmethod
     def of(cls, surface: TriMesh, *, refine: bool) -> Work:
         """All of it."""
-        n_faces = surface.n_faces
-        left = max(_STEPS, _SMALL / n_faces)
-        return cls(n_faces, left, _UNREFINED if refine else int(left))
+        work = cls(surface.n_faces, max(_EACH * surface.n_faces, _LEAST), _UNREFINED)
+        if not refine:
+            work.most = work.steps()
+        return work
 
-    def spend(self, steps: int, n_faces: int | None = None, each: float = 1.0) -> None:
+    def spend(self, steps: float, n_faces: int | None = None) -> None:
         """Newton steps on a surface of so many faces."""
-        self.left -= each * steps * (n_faces or self.n_faces) / self.n_faces
+        self.left -= steps * _cost(n_faces or self.n_faces)
 
-    def spend_in_chart(self, steps: int, n_faces: int | None = None) -> None:
-        """Newton steps in the flat chart of a surface of so many faces."""
-        self.spend(steps, n_faces, _CHART)
+    def spend_in_chart(self, steps: int) -> None:
+        """Newton steps in the flat chart."""
+        self.spend(_CHART * steps)
 
-    def spend_on_fitting(self) -> None:
-        """Edges of the surface given halved until none sags too much."""
-        self.left -= _FITTING
+    def spend_on_approach(self, steps: int, n_faces: int) -> None:
+        """Newton steps on a surface of so many faces, whichever way these look."""
+        self.spend(_LOOSE * steps, n_faces)
+
+    def spend_on_fitting(self, n_faces: int) -> None:
+        """Edges halved until none sags too much, which has led to so many faces."""
+        self.spend(_FITTING, n_faces)
 
     def spend_on_rings(self, n_faces: int) -> None:
         """The projection of the rings of a surface of so many faces."""
-        self.left -= _RINGS * n_faces / self.n_faces
+        self.spend(RINGS, n_faces)
 
     def steps(self, n_faces: int | None = None) -> int:
         """Newton steps that can be afforded on a surface of so many faces."""
-        return max(int(self.left * self.n_faces / (n_faces or self.n_faces)), 0)
+        return max(int(self.left / _cost(n_faces or self.n_faces)), 0)

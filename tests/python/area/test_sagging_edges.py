@@ -11,7 +11,7 @@ import stretchmap as sm
 from stretchmap import TriMesh, _core
 from stretchmap.area import finer
 from stretchmap.area.coarse import Level
-from stretchmap.area.finer import Finer, goal, mapped_finer, too_coarse
+from stretchmap.area.finer import Finer, goal, mapped_finer
 from stretchmap.area.finish import Steps
 from stretchmap.area.route import Made
 from stretchmap.area.work import Work
@@ -77,14 +77,14 @@ def test_halving_keeps_the_chart() -> None:
 def test_what_sags_is_found_and_fitted() -> None:
     start = start_of(small_handle(0, 4.2))
     level = start.level
-    assert too_coarse(level, start.angles, start.ratio)
+    assert Finer.of(level, start.angles, start.ratio).too_coarse()
     fitted = start.fitted()
     assert fitted is not None and fitted.sags().max() <= 1.0 < start.sags().max()
     assert 0.0 < fitted.share < 1.0
     assert start_of(small_handle(0)).fitted() is None  # so many faces are not worth it
     torus = sm.samples.torus_surface()
     fine = start_of(torus)
-    assert not too_coarse(fine.level, fine.angles, fine.ratio)
+    assert not fine.too_coarse()
     # The sag of an edge along the outer equator, over the height of its faces.
     equator = start_of(sm.samples.torus_surface(30, 20, 3.0, 1.0))
     turn = TWO_PI / 30
@@ -117,17 +117,21 @@ def test_rings_are_made_exact_only_where_faces_are_good() -> None:
 def test_steps_are_counted_by_their_faces() -> None:
     surface = sm.samples.torus_surface(100, 80)
     work = Work.of(surface, refine=True)
-    assert (work.n_faces, work.left, work.most) == (16_000, 150.0, 40)
+    assert (work.n_faces, work.most) == (16_000, 40)
+    most = work.steps()
     work.spend(10)
-    work.spend(10, 32_000)
-    assert work.left == 120.0 and work.steps() == 120 and work.steps(64_000) == 30
-    work.spend_in_chart(100)
-    assert work.left == pytest.approx(80.0)
-    work.spend_in_chart(10, 32_000)
-    assert work.left == pytest.approx(72.0)
+    assert work.steps() == most - 10
+    work.spend(10, 32_000)  # twice the faces, and more than twice the work each
+    assert most - 40 < work.steps() < most - 30
+    assert work.steps(64_000) < work.steps() / 4
+    left = work.steps()
+    work.spend_in_chart(10)
+    assert left - 10 < work.steps() < left
     work.spend(200)
     assert work.steps() == 0
-    assert Work.of(sm.samples.torus_surface(), refine=False).left > 150.0
+    small = sm.samples.torus_surface()
+    unrefined = Work.of(small, refine=False)
+    assert unrefined.most == unrefined.steps() > most
 
 
 def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> None:
@@ -142,7 +146,7 @@ def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> 
     monkeypatch.setattr(finer, "_STEPS", 3)
     made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
     n_faces = start.level.surface.n_faces
-    work = Work(n_faces, 30.0, 40)
+    work = Work(n_faces, 200.0 * n_faces, 40)
     found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
     assert found is not None and len(asked) >= 2 and found[1].added.n_split
     assert [record.iteration for record in found[0].history].count(0) == 2
