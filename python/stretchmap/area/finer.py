@@ -43,6 +43,7 @@ _SLIVER = 3.0  # times the median: longer faces are given the height they would 
 _GROWTH, _SPARE = 2.5, 12_000  # most faces: so many times those of the input, and so many more
 _BENT = 0.5  # least share of its area that a face may keep when the flat chart is bent
 _PASSES = 14
+_MORE = 3  # times as many faces that look inward as before: halving edges does not help
 _APPROACH = 10, 10, 10  # most steps towards areas, edges that sag too much halved after each
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
@@ -113,7 +114,7 @@ class Finer:
             i, j = flat.level.surface.edges.T
             span = np.abs(s[j] - s[i] + TWO_PI * flat.level.forms[1])
             marked = flat.largest_in(np.flatnonzero(over), span)
-            if flat.too_many(marked):
+            if flat.too_many(int(marked.sum())):
                 break
             flat = flat.halved(marked)
         angles = start_angles(flat.level.chart, flat.angles / TWO_PI, 0.0, flat.ratio)
@@ -166,23 +167,32 @@ class Finer:
         """
         finer = self
         for _ in range(_PASSES):
-            marked = finer.sags() > sag
+            sags = finer.sags()
+            marked = sags > sag
             if not marked.any():
                 break
-            if finer.too_many(marked):
+            # Halves of an edge sag a quarter as much over faces of the same height.
+            pieces = np.ceil(np.sqrt(sags[marked] / sag))
+            if finer.too_many(int(pieces.sum()) - len(pieces)):
                 return None
             finer = finer.halved(marked)
         return finer.outward()
 
     def outward(self) -> Finer:
-        """With the edges halved that sag most in faces that look inward, while there are any."""
-        finer = self
+        """With the edges halved that sag most in faces that look inward, while there are any.
+
+        As it was where they become more: they are nearly folded in the chart, too.
+        """
+        finer, fewest = self, 0
         for _ in range(_PASSES):
             inward = _core.certificate.torus_graph(
                 finer.image, finer.level.chart.faces, finer.ratio
             ).bad
+            fewest = min(fewest, len(inward)) if fewest else len(inward)
+            if len(inward) > _MORE * fewest:
+                return self
             marked = finer.largest_in(inward, finer.sags())
-            if not marked.any() or finer.too_many(marked):
+            if not marked.any() or finer.too_many(int(marked.sum())):
                 break
             finer = finer.halved(marked)
         return finer
@@ -207,7 +217,8 @@ class Finer:
         finer, history = self, []
         for most in _APPROACH:
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
-            records, pace = approach_areas(newton, min(most, work.steps(n_faces)), progress)
+            affordable = max(work.steps(n_faces) - _LEAST_STEPS, 0)
+            records, pace = approach_areas(newton, min(most, affordable), progress)
             work.spend_on_approach(len(records), n_faces)
             history += records
             finer = replace(finer, angles=newton.angles)
@@ -230,7 +241,11 @@ class Finer:
         """With the edges halved that sag most in faces whose areas are off; None without any."""
         off = np.flatnonzero(np.abs(self.ratios() - 1.0) > _OFF * tol)
         marked = self.largest_in(off, self.sags(), _LITTLE)
-        return self.halved(marked).outward() if marked.any() and not self.too_many(marked) else None
+        return (
+            self.halved(marked).outward()
+            if marked.any() and not self.too_many(int(marked.sum()))
+            else None
+        )
 
     def too_coarse(self) -> bool:
         """Whether so many edges sag so much that the surface needs more before anything else."""
@@ -241,10 +256,10 @@ class Finer:
         """Faces of the input over those there are."""
         return 1.0 - self.added.n_added_faces / len(self.added.parent_face)
 
-    def too_many(self, marked: NDArray[np.bool_]) -> bool:
-        """Whether halving these edges, too, would take more faces than may be."""
+    def too_many(self, more: int) -> bool:
+        """Whether so many vertices more would make more faces than may be."""
         n_faces = len(self.added.parent_face)
-        return n_faces + 2 * int(marked.sum()) > _GROWTH * n_faces * self.share + _SPARE
+        return n_faces + 2 * more > _GROWTH * n_faces * self.share + _SPARE
 
 
 def mapped_finer(
@@ -264,7 +279,6 @@ def mapped_finer(
     clock = time.perf_counter()
     error, best = np.inf, None if finer.added.n_split else (made, finer)
     history, idle, at_once = list(made.history), 0, finer.added.n_split > 0
-    most_unfolding = int(np.clip(_UNFOLDING[0] * work.left, *_UNFOLDING[1]))
 
     def begun(finer: Finer, least: int) -> tuple[Finer, Pace] | None:
         """From where steps go on, if so many can be afforded and lead to no folded face."""
@@ -274,7 +288,8 @@ def mapped_finer(
         history.extend(records)
         newton, n_faces = finer.newton(), finer.level.surface.n_faces
         if not newton.least_facing() > 0.0:
-            unfolding = unfold_faces(newton, most_unfolding, progress)
+            most = int(np.clip(_UNFOLDING[0] * work.steps(n_faces), *_UNFOLDING[1]))
+            unfolding = unfold_faces(newton, most, progress)
             work.spend(len(unfolding), n_faces)
             history.extend(unfolding)
             if not newton.least_facing() > 0.0:

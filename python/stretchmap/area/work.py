@@ -10,7 +10,7 @@ from ..mesh.surfaces import TriMesh
 # In units of what a face adds to a step where elimination costs nothing: so many a face of the
 # surface given, and no fewer than those. Half a millisecond a face where a unit takes a
 # microsecond.
-_EACH, _LEAST = 500.0, 2.3e6
+_EACH, _LEAST = 480.0, 2.1e6
 _EVEN = 2_000.0  # faces where elimination takes as long as the rest of a step; its share grows
 _UNREFINED = 40  # steps where edges can be halved after them
 # Steps that others take as long as: one in the flat chart, one without a barrier against faces that

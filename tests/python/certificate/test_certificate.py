@@ -105,6 +105,33 @@ def test_crossings_do_not_depend_on_the_search_tree():
     assert pairs == brute and len(brute) > 20
 
 
+@pytest.mark.parametrize("size", [1e-30, 1.0, 1e75])
+def test_pieces_of_a_flat_face_do_not_cross(size):
+    """They are coplanar but for the rounding of their corners; what runs through them crosses."""
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        corners = rng.normal(size=(3, 3)) * [1.0, 1.0, 0.02]
+        corners = corners @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        weights = np.array([(i, j, 8 - i - j) for i in range(9) for j in range(9 - i)]) / 8.0
+        number = {tuple(w[:2]): k for k, w in enumerate((8 * weights).astype(int))}
+        pieces = [
+            [number[i + a, j + b] for a, b in around]
+            for around in (((0, 0), (1, 0), (0, 1)), ((1, 0), (1, 1), (0, 1)))
+            for i, j in number
+            if all((i + a, j + b) in number for a, b in around)
+        ]
+        F = np.array(pieces, np.int32)
+        points = size * (weights @ corners)
+        assert len(F) == 64 and not len(_core.certificate.crossing_faces(points, F, 10))
+        first, second, third = points[F[9]]
+        normal = np.cross((second - first) / size, (third - first) / size) * size
+        through = points[F[9]].mean(axis=0) + np.array([[-1.0], [1.0], [2.0]]) * normal
+        through[2] += 0.5 * (second - first)
+        F = np.concatenate([F, np.arange(3, dtype=np.int32)[None] + len(points)])
+        found = _core.certificate.crossing_faces(np.concatenate([points, through]), F, 100)
+        assert [9, 64] in found.tolist()
+
+
 # Maps that are bijections
 
 
