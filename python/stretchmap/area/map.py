@@ -143,17 +143,20 @@ def area_map(
     ``sum w [(rho - 1/rho)^2 / 4 + (shape Q + chart (sigma + 1/sigma - 2)) / weight]``: w as the
     root of a face's area, rho its area ratio in space, Q = (s1/s2 + s2/s1)/2 - 1 its angle
     distortion, sigma its area ratio in the chart, infinite before a face turns over. The weight
-    grows from step to step.
+    grows from step to step; that of shapes is less the more of them is lost at the start. Faces
+    that look outward by less than half their area are held by a barrier.
 
     A surface of more than 40,000 faces is first mapped with fewer, by removing vertices; a step of
     stretch energy minimisation and a few Newton steps follow on the surface itself.
 
     A flat face is no thinner than the sag below the arc over its longest edge. Where many edges sag
-    by more than twice the height their faces are to have, all that sag by more than that height are
-    halved in the chart before anything else; where areas stay off, the edges that sag most in
-    faces that are off, three times at most. Where that takes too many faces or leaves some folded,
-    the chart is eased first: its areas are left off for the sake of shapes. All steps together cost
-    no more than some 150 on the surface itself, more on one of less than 4,800 faces.
+    by more than twice the height their faces are to have, all that sag too much are halved in the
+    chart before anything else, which is eased towards shapes for it, further where that takes too
+    many faces. Newton steps that let faces look inward lead to nearly right areas, edges that sag
+    too much by then are halved, too, as are those of faces left looking inward; then the steps
+    above follow. Where areas stay off, the edges that sag most in faces that are off are halved,
+    three times at most. All steps together cost no more than some hundred on the surface itself,
+    more on one of less than 5,000 faces.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.

@@ -50,10 +50,11 @@ class AreaMap(MapResult):
         One record per iteration: stage ``"coarse"`` where a surface of more than 40,000 faces was
         mapped by way of coarser ones; stage ``"sem"`` measured in the equal-area chart, its energy
         E_S (4.1) of shares, at least 1; stage ``"balance"``, Newton steps in that chart where the
-        first jams; stages ``"untangle"`` and ``"newton"`` on the polyhedral image, the energy of
-        the latter that of the finishing solve over the weight of its area term: within ``"sem"``
-        and ``"newton"`` it never rises. There ``flips`` are the faces that do not look outward
-        along the whole face, what the certificate checks.
+        first jams; stages ``"untangle"``, ``"approach"``, whichever way faces look meanwhile, and
+        ``"newton"`` on the polyhedral image, the energy of the last that of the finishing solve
+        over the weight of its area term: within ``"sem"`` and ``"newton"`` it never rises. There
+        ``flips`` are the faces that do not look outward along the whole face, what the certificate
+        checks.
     certificate : Certificate
         Whether the map is proven to be one to one, computed independently of how it was found.
     distortion : Distortion

@@ -9,11 +9,12 @@
 //                      + facing mean((x^2 + 1) / chi(x) - 2) ]
 //
 // x = how far the flat face looks outward over |t|, at its corners and where it does least (see
-// torus_graph.hpp), chi = (x + sqrt(x^2 + epsilon^2)) / 2. The chart term is infinite before a face
-// can turn over in the chart; so is the facing term, for epsilon = 0, before a face breaks the
-// certificate's condition, which a coarse one can do while its chart area is positive. With
-// epsilon > 0 it is finite there and draws such faces back. Areas of source and torus are scaled to
-// one.
+// torus_graph.hpp), chi = (x + sqrt(x^2 + epsilon^2)) / 2. For epsilon = 0, x is twice that and the
+// term nought from x = 1 on: what looks outward by half its area needs no barrier, and few faces
+// have less. The chart term is infinite before a face can turn over in the chart; so is the facing
+// term, for epsilon = 0, before a face breaks the certificate's condition, which a coarse one can
+// do while its chart area is positive. With epsilon > 0 it is finite there and draws such faces
+// back. Areas of source and torus are scaled to one.
 #pragma once
 
 #include "stretchmap/area/chart.hpp"
