@@ -60,8 +60,12 @@ _GAIN, _IDLE = 0.9, 2  # rounds in a row that leave more of the error end them
 
 def goal(surface: TriMesh, tol: float) -> float:
     """Face SD that halving edges should lead to: three times as much where there are slivers."""
-    slivers = float((_slender(surface) > _LONG).mean()) > _FEW
-    return max(_GOOD * tol, _LEAST_GOOD) * (_SLIVERS if slivers else 1.0)
+    return max(_GOOD * tol, _LEAST_GOOD) * (_SLIVERS if has_slivers(surface) else 1.0)
+
+
+def has_slivers(surface: TriMesh) -> bool:
+    """Whether more than a few faces are long and thin."""
+    return float((_slender(surface) > _LONG).mean()) > _FEW
 
 
 def _slender(surface: TriMesh) -> NDArray[np.float64]:

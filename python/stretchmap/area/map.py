@@ -24,7 +24,7 @@ from ..maps.history import IterationRecord
 from ..mesh.given import as_surface, require_same_mesh
 from ..mesh.halved_faces import SurfaceRefinement
 from .coarse import Level, levels
-from .finer import Finer, goal, mapped_finer
+from .finer import Finer, goal, has_slivers, mapped_finer
 from .finish import Steps, cut_short, finish_areas, unfolded
 from .flat import unfolded_turns
 from .result import AreaMap
@@ -45,7 +45,8 @@ _MOST_TURNS = 1e3  # a phase may have
 SHAPES = (1.0, 10.0, 100.0, 1e3)
 # The same where the surface is to become finer. Its areas are far from equal in such a chart, so
 # edges are halved for good only once they are nearly right: until then up to that sag is left.
-_EASED = (0.1, 0.3, 1.0)
+# Slivers have no shape to keep, and lose their areas to the others'.
+_EASED, _SLIVERS_EASED = (0.1, 0.3, 1.0), (0.01, 0.1, 1.0)
 _COARSELY = 1.5
 
 
@@ -244,7 +245,7 @@ def _finer_at_once(
     work.spend_in_chart(sum(record.stage == "balance" for record in records))
     if not Finer.wrapped(level, turns, phase, ratio).too_coarse():
         return None
-    for shape in _EASED:
+    for shape in _SLIVERS_EASED if has_slivers(level.surface) else _EASED:
         turns, more = equal.eased(shape, turns)
         records = records + more
         work.spend_in_chart(len(more))
