@@ -284,9 +284,9 @@ def mapped_finer(
     error, best = np.inf, None if finer.added.n_split else (made, finer)
     history, idle, at_once = list(made.history), 0, finer.added.n_split > 0
 
-    def begun(finer: Finer, least: int) -> tuple[Finer, Pace] | None:
-        """From where steps go on, if so many can be afforded and lead to no folded face."""
-        if work.steps(finer.level.surface.n_faces) < least:
+    def begun(finer: Finer) -> tuple[Finer, Pace] | None:
+        """From where steps go on, if some can be afforded and lead to no folded face."""
+        if work.steps(finer.level.surface.n_faces) < _STEPS:
             return None
         finer, pace, records = finer.approached(progress, work)
         history.extend(records)
@@ -307,7 +307,7 @@ def mapped_finer(
         # What the steps on a surface have made good wants no more vertices.
         enough = not first and float(finer.ratios().std()) <= wanted
         halved = finer if first else None if enough else finer.where_off(steps.tol)
-        start = None if halved is None else begun(halved, 0 if first else _STEPS)
+        start = None if halved is None else begun(halved)
         if start is not None:
             finer, pace = start
         elif cut_short(reason) and not last and work.steps(finer.level.surface.n_faces):
