@@ -141,8 +141,7 @@ def test_large_faces_keep_their_areas_where_the_flat_chart_is_bent(seed: int) ->
 def test_areas_are_led_near_and_no_face_is_left_inward(seed: int) -> None:
     start = Finer.wrapped(*eased(small_handle(seed, 3.8))).fitted(1.5)
     assert start is not None and start.ratios().std() > 0.2
-    work = Work(start.level.surface.n_faces, np.inf, 40)
-    work.left = 1e9
+    work = Work(start.level.surface.n_faces, 1e9, 40)
     near, pace, records = start.approached(None, work)
     assert {record.stage for record in records} == {"approach"} and work.left < 1e9
     assert near.ratios().std() < 0.15 and near.sags().max() <= 1.0 and pace.weight > 1.0
