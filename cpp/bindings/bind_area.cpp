@@ -121,6 +121,7 @@ void bind_glide(py::module_& m) {
           py::arg("most_best"), release_gil())
       .def("measures", &SurfaceNewton::measures, release_gil())
       .def("least_facing", &SurfaceNewton::facing, release_gil())
+      .def("flops", &SurfaceNewton::flops, release_gil())
       .def_property_readonly("angles", &SurfaceNewton::angles, py::return_value_policy::copy);
 }
 

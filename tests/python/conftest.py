@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stretchmap.base import budget
 from stretchmap.mesh.meshes import TetMesh, TriMesh
-from stretchmap.volume import budget
 
 _ROOT = Path(__file__).resolve().parents[2]
 _MESHES = Path(os.environ.get("STRETCHMAP_MESHES", _ROOT.parent / "shared" / "meshes"))

@@ -10,9 +10,13 @@ Vec ChartSystem::solve(const Rows& hessians, const Vec& gradient, const Poll& po
   const double ridge = ridge_ * Vec(matrix.diagonal()).mean();
   for_rows(static_cast<Index>(matrix.rows()), [&](Index i) { matrix.coeffRef(i, i) += ridge; });
   if (poll) poll();
-  if (!solver_) solver_.emplace(matrix);
-  solver_->factorize(matrix, poll);
+  solver().factorize(matrix, poll);
   return solver_->solve(-gradient);
+}
+
+linalg::BlockLdlt<2>& ChartSystem::solver() {
+  if (!solver_) solver_.emplace(pattern_.matrix());
+  return *solver_;
 }
 
 }  // namespace stretchmap::area

@@ -50,8 +50,7 @@ NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) 
   const double scale = best_scale(problem_, angles_);
   const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
   rings_.reset();
-  if (!system_) system_.emplace(problem_.chart.faces, problem_.chart.n_vertices, kHoldRotation);
-  const Vec flat = system_->solve(here.hessians, here.gradient, poll);
+  const Vec flat = system().solve(here.hessians, here.gradient, poll);
   const Points2 direction = without_rotation(as_rows(flat));
 
   const double slope = here.gradient.dot(flat);
@@ -72,6 +71,13 @@ NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) 
   }
   return result;
 }
+
+ChartSystem& SurfaceNewton::system() {
+  if (!system_) system_.emplace(problem_.chart.faces, problem_.chart.n_vertices, kHoldRotation);
+  return *system_;
+}
+
+double SurfaceNewton::flops() { return system().flops(); }
 
 // At most 1, and at most nine tenths of the way to the first face of no area in the (u, v) chart.
 double SurfaceNewton::longest_step(const Points2& direction) const {

@@ -221,6 +221,7 @@ class Finer:
         finer, history = self, []
         for most in _APPROACH:
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
+            work.begin(newton, n_faces)
             affordable = max(work.steps(n_faces) - _LEAST_STEPS, 0)
             records, pace = approach_areas(newton, min(most, affordable), progress)
             work.spend_on_approach(len(records), n_faces)
@@ -318,8 +319,9 @@ def mapped_finer(
         n_faces = finer.level.surface.n_faces
         affordable = work.steps(n_faces)
         with_rings = rings and affordable >= _LEAST_STEPS + RINGS
-        most = max(affordable - with_rings * RINGS, _LEAST_STEPS)
+        most = affordable - RINGS if with_rings else work.steps(n_faces, least=_LEAST_STEPS)
         most = min(most if last else min(most, _STEPS), steps.max_iter)
+        work.begin(newton, n_faces)
         records, converged, reason = finish_areas(
             newton, with_rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
         )

@@ -210,7 +210,7 @@ def worth_rings(measured: _core.area.SurfaceMeasures, tol: float) -> bool:
 
 def cut_short(reason: str) -> bool:
     """Whether more steps would have followed."""
-    return reason.startswith(_MOST_DONE)
+    return _MOST_DONE in reason
 
 
 def _verdict(measured: _core.area.SurfaceMeasures, tol: float, reason: str) -> tuple[bool, str]:

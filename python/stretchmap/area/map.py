@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import read_only
+from ..base.budget import Budget
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
@@ -66,6 +67,7 @@ def area_map(
     balance: float = 1.0,
     sem_iter: int = 10,
     refine: bool = True,
+    time_limit: float = 1e-3,
     keep_best: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -102,9 +104,9 @@ def area_map(
         Goal for the standard deviation of the face ratios; none is to be off by more than 10 times
         that.
     shape_budget : float
-        Once the face SD is below 4 ``tol``, the Newton steps end where the mean angle distortion
-        exceeds the least seen by this factor: on regular triangulations the last per cent of area
-        is paid for with needles.
+        Once the face SD is below twice ``tol``, the Newton steps end where the mean angle
+        distortion exceeds the least seen by this factor: on regular triangulations the last per
+        cent of area is paid for with needles.
     balance : float
         From 0, the Newton steps keep shapes as well as areas, to 1, areas alone: the power to which
         the largest weight of the area term is raised. Below 1 they end where the energy is at rest,
@@ -115,6 +117,9 @@ def area_map(
         Halve edges that span so much of the torus that no flat face beside them can have its area,
         where the face SD would exceed twice ``tol`` and 0.01; ``mesh`` of the result is then finer
         than ``surface``. Not with ``finish="none"`` or a ``balance`` below 1.
+    time_limit : float
+        Processor seconds per face, of all threads, that may be spent: where they are used up, the
+        steps end. Small surfaces get some seconds.
     keep_best : bool
         Return the map even if it is not certified.
     threads : int, optional
@@ -156,8 +161,8 @@ def area_map(
     many faces. Newton steps that let faces look inward lead to nearly right areas, edges that sag
     too much by then are halved, too, as are those of faces left looking inward; then the steps
     above follow. Where areas stay off, the edges that sag most in faces that are off are halved,
-    three times at most. All steps together cost no more than some hundred on the surface itself,
-    more on one of less than 5,000 faces.
+    three times at most. All steps together cost no more than some two hundred on the surface
+    itself, more on one of less than 4,000 faces, and no more than ``time_limit``.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
@@ -177,13 +182,14 @@ def area_map(
         raise OptionError("balance acts in the finishing steps: take finish='ring' or 'face'")
     keep_best, refine = flag("keep_best", keep_best), flag("refine", refine)
     callback("progress", progress)
+    budget = Budget.of(real("time_limit", time_limit, above=0.0), surface.n_faces)
     clock = time.perf_counter()
     conformal = _start(surface, basis, conformal, progress)
     seconds = {"conformal": time.perf_counter() - clock}
     wanted = ratio if torus is None else torus.ratio
     steps = Steps(max_iter, tol, shape_budget if balance == 1.0 else math.inf, balance)
     route = Route(phase, wanted, sem_iter, finish, steps)
-    found = _found(route, surface, conformal, progress, torus, refine and balance == 1.0)
+    found = _found(route, surface, conformal, progress, torus, refine and balance == 1.0, budget)
     if not found.converged:
         _log.warning("area map: %s", found.stop_reason)
     if finish != "none" and not (found.certificate.certified or keep_best):
@@ -202,15 +208,37 @@ def _found(
     progress: Progress | None,
     torus: Torus | None,
     refine: bool,
+    budget: Budget,
 ) -> AreaMap:
     """The map a route leads to, on a finer surface where it takes one, certified or not."""
     equal = equal_areas(surface, conformal, progress)
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
-    stack, finer = levels(equal.level), None
-    work = Work.of(surface, refine=refine and len(stack) == 1)
+    stack = levels(equal.level)
+    refine = refine and len(stack) == 1
+    work = Work.of(surface, budget, refine=refine)
+    found = _finest(route, stack, equal, conformal, progress, torus, refine, work)
+    if not (work.hurried and cut_short(found.stop_reason)):
+        return found
+    return dataclasses.replace(
+        found, stop_reason=f"the time limit was reached; {found.stop_reason}"
+    )
+
+
+def _finest(
+    route: Route,
+    stack: list[Level],
+    equal: EqualAreas,
+    conformal: ConformalMap,
+    progress: Progress | None,
+    torus: Torus | None,
+    refine: bool,
+    work: Work,
+) -> AreaMap:
+    """The same, of a surface as fine as there is work for."""
+    surface, finer = equal.level.surface, None
     wanted = goal(surface, route.steps.tol)
-    if refine and len(stack) == 1:
+    if refine:
         finer = _finer_at_once(route, equal, progress, torus, work)
         if finer is not None and finer.certificate.certified:
             return finer
@@ -298,7 +326,7 @@ def _along(
     made = follow(route, stack, progress, equal if len(stack) == 1 else None, work)
     found = _result(surface, forms, made, torus)
     for shape in SHAPES:
-        if found.certificate.certified or not _folded(found):
+        if found.certificate.certified or not _folded(found) or work.clock.spent:
             return found
         _log.info("%s: once more with weight %g of shape", found.certificate.reason, shape)
         along = dataclasses.replace(route, shape=shape)
@@ -336,7 +364,8 @@ def charted(
 ) -> AreaMap:
     """The unfinished map of a route, as it is in the chart, certified or not."""
     surface = equal.level.surface
-    made = follow(route, [equal.level], progress, equal, Work.of(surface, refine=False))
+    unbounded = Work.of(surface, Budget(math.inf), refine=False)
+    made = follow(route, [equal.level], progress, equal, unbounded)
     return _result(surface, conformal.forms, made, torus)
 
 

@@ -149,6 +149,8 @@ def _climb(
             made.angles = level.prolonged(made.angles, ratio)
             pace = pace.finer()
         most = FEW_UNFOLD_STEPS if finest else None
+        if finest:
+            work.begin(None, work.n_faces)
         newton, unfolding = unfolded(
             level, made.angles, ratio, progress, keep=route.shape > 0.0, most=most
         )
@@ -158,8 +160,9 @@ def _climb(
             if not newton.least_facing() > 0.0:
                 made.angles, made.converged, made.reason = newton.angles, False, "faces stay folded"
                 break
-            affordable = min(max(work.steps(), _LEAST_STEPS), work.most)
+            affordable = min(work.steps(least=_LEAST_STEPS), work.most)
             steps = dataclasses.replace(steps, max_iter=min(steps.max_iter, affordable))
+            work.begin(newton, work.n_faces)
         records, made.converged, made.reason = finish_areas(
             newton, finest and route.finish == "ring", steps, progress, pace
         )

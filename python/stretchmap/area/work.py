@@ -3,29 +3,31 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 
+from .. import _core
+from ..base.budget import Budget
 from ..mesh.surfaces import TriMesh
 
-# In units of what a face adds to a step where elimination costs nothing: so many a face of the
-# surface given, and no fewer than those. Half a millisecond a face where a unit takes a
-# microsecond.
-_EACH, _LEAST = 480.0, 2.1e6
-_EVEN = 2_000.0  # faces where elimination takes as long as the rest of a step; its share grows
+# In units of what a face adds to a step besides its share of the elimination: so many a face of
+# the surface given, and no fewer than those.
+_EACH, _LEAST = 380.0, 1.5e6
+_FLOPS = 2.1e4  # of an elimination, that take as long as one
+_TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
 _UNREFINED = 40  # steps where edges can be halved after them
 # Steps that others take as long as: one in the flat chart, one without a barrier against faces that
 # look inward, halving edges until few sag, and rings made exact.
 _CHART, _LOOSE, _FITTING, RINGS = 0.6, 0.9, 3, 8
-
-
-def _cost(n_faces: int) -> float:
-    """Of a step: elimination by nested dissection grows as the power 3/2 of the faces."""
-    return n_faces * (1.0 + math.sqrt(n_faces / _EVEN))
+_TOLD = 0.02  # of all the time; steps that took as long tell how long others will take
+_KEPT = 0.05  # of it, for the certificate
 
 
 @dataclass
 class Work:
-    """What is left of it.
+    """What is left of it: units, and processor time.
+
+    Where time is enough, units alone count, and are the same each time.
 
     Attributes
     ----------
@@ -34,23 +36,47 @@ class Work:
     left : float
     most : int
         Steps on a surface before edges are halved where they end short.
+    clock : Budget
+    hurried : bool
+        Whether time has allowed fewer steps than units did.
     """
 
     n_faces: int
     left: float
     most: int
+    clock: Budget = field(default_factory=lambda: Budget(math.inf))
+    hurried: bool = False
+    _flops: float = _TYPICAL  # of the surfaces seen last
+    _begun: float | None = None
+    _units: float = 0.0  # of which is known how long they took
+    _seconds: float = 0.0
 
     @classmethod
-    def of(cls, surface: TriMesh, *, refine: bool) -> Work:
+    def of(cls, surface: TriMesh, clock: Budget, *, refine: bool) -> Work:
         """All of it."""
-        work = cls(surface.n_faces, max(_EACH * surface.n_faces, _LEAST), _UNREFINED)
+        left = max(_EACH * surface.n_faces, _LEAST)
+        work = cls(surface.n_faces, left, _UNREFINED, clock)
         if not refine:
             work.most = work.steps()
         return work
 
+    def begin(self, newton: _core.area.SurfaceNewton | None, n_faces: int) -> None:
+        """Steps, of which the next `spend` tells how many they were.
+
+        What its elimination takes, which separators tell, holds for finer surfaces, too.
+        """
+        self._begun = time.process_time()
+        if newton is not None:
+            self._flops = newton.flops() / n_faces**1.5
+
     def spend(self, steps: float, n_faces: int | None = None) -> None:
         """Newton steps on a surface of so many faces."""
-        self.left -= steps * _cost(n_faces or self.n_faces)
+        units = steps * self._cost(n_faces or self.n_faces)
+        self.left -= units
+        if self._begun is not None:
+            self._units += units
+            self._seconds += time.process_time() - self._begun
+            self._begun = None
 
     def spend_in_chart(self, steps: int) -> None:
         """Newton steps in the flat chart."""
@@ -68,6 +94,23 @@ class Work:
         """The projection of the rings of a surface of so many faces."""
         self.spend(RINGS, n_faces)
 
-    def steps(self, n_faces: int | None = None) -> int:
-        """Newton steps that can be afforded on a surface of so many faces."""
-        return max(int(self.left / _cost(n_faces or self.n_faces)), 0)
+    def steps(self, n_faces: int | None = None, *, least: int = 0) -> int:
+        """Newton steps that can be afforded on a surface of so many faces.
+
+        At least so many, if there is time for them.
+        """
+        cost = self._cost(n_faces or self.n_faces)
+        units, in_time = max(self.left, least * cost), self._in_time()
+        self.hurried = self.hurried or in_time < units
+        return max(int(min(units, in_time) / cost), 0)
+
+    def _cost(self, n_faces: int) -> float:
+        """Of a step."""
+        return n_faces * (1.0 + self._flops * math.sqrt(n_faces) / _FLOPS)
+
+    def _in_time(self) -> float:
+        """Units there is time for, at the rate of the steps so far."""
+        if self._seconds < _TOLD * self.clock.seconds or self._units == 0.0:
+            return math.inf
+        left = max(self.clock.left - _KEPT * self.clock.seconds, 0.0)
+        return left * self._units / self._seconds

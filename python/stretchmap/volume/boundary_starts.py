@@ -15,12 +15,12 @@ from ..area.map import SHAPES, charted, equal_areas, finished, turned
 from ..area.result import AreaMap
 from ..area.route import Route
 from ..area.search import Ratio
+from ..base.budget import Budget, Spent
 from ..base.progress import Progress, report
 from ..conformal.map import conformal_map
 from ..errors import SolverError
 from ..mesh.meshes import TetMesh, TriMesh
 from .anisotropy import unstretching
-from .budget import Budget, Spent
 from .options import VolumeOptions
 
 __all__ = ["boundary_starts"]

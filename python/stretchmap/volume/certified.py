@@ -9,9 +9,9 @@ import math
 import time
 from collections.abc import Iterator
 
+from ..base.budget import Budget
 from ..base.progress import Progress
 from ..mesh.meshes import TetMesh
-from .budget import Budget
 from .engine import solve
 from .options import VolumeOptions
 from .problem import Outcome
@@ -53,7 +53,7 @@ def certified_map(
         Whether the boundary moves on the torus.
     progress : Progress or None
     """
-    budget = Budget.of(options, solid.n_tets)
+    budget = Budget.of(options.time_limit, solid.n_tets)
     starts = iter([start] if start is not None else [])
     if start is None:
         starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.budget import Budget
 from ..base.progress import Progress
 from ..certificate.checks import certify
 from ..mesh.refinement import crowded_edges, longest_inner_edges
-from .budget import Budget
 from .equalize import equalize
 from .exact_rings import make_rings_exact
 from .ground import glide_on_mesh, untangle_on_mesh
@@ -125,7 +125,7 @@ def solve(
         Whether the problem is one that ended so.
     progress : Progress, optional
     """
-    budget = budget or Budget.of(options, problem.solid.n_tets)
+    budget = budget or Budget.of(options.time_limit, problem.solid.n_tets)
     clock = time.perf_counter()
     problem = started(problem, solver=options.solver)
     history = History(problem.model(options), budget.share(patience), progress)

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.budget import Budget
 from ..base.progress import Progress, report
 from ..base.torus import Torus
 from ..maps.history import IterationRecord
 from ..mesh.meshes import TriMesh
-from .budget import Budget
 from .options import FillOptions
 
 __all__ = ["History", "SolidModel", "face_areas"]

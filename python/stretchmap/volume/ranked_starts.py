@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import _core
+from ..base.budget import Budget
 from ..base.progress import Progress
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .boundary_starts import boundary_starts
-from .budget import Budget
 from .options import VolumeOptions
 from .problem import VolumeProblem
 from .start import started

@@ -21,7 +21,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from .. import _core
-from .budget import Budget
+from ..base.budget import Budget
 from .model import FIXED, GLIDING, History, SolidModel
 
 __all__ = ["Untangled", "folded_faces", "stuck_tets", "untangle_patches", "untangle_whole"]

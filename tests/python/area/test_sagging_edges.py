@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from stretchmap.area.map import equal_areas
 from stretchmap.area.route import Made
 from stretchmap.area.search import search_phase
 from stretchmap.area.work import Work
+from stretchmap.base.budget import Budget
 from stretchmap.base.torus import TWO_PI
 from stretchmap.mesh.halved_faces import halve_edges
 
@@ -171,7 +173,7 @@ def test_rings_are_made_exact_only_where_faces_are_good() -> None:
 
 def test_steps_are_counted_by_their_faces() -> None:
     surface = sm.samples.torus_surface(100, 80)
-    work = Work.of(surface, refine=True)
+    work = Work.of(surface, Budget(np.inf), refine=True)
     assert (work.n_faces, work.most) == (16_000, 40)
     most = work.steps()
     work.spend(10)
@@ -182,11 +184,37 @@ def test_steps_are_counted_by_their_faces() -> None:
     left = work.steps()
     work.spend_in_chart(10)
     assert left - 10 < work.steps() < left
-    work.spend(200)
-    assert work.steps() == 0
+    work.spend(300)
+    assert work.steps() == 0 and work.steps(least=10) == 10 and not work.hurried
     small = sm.samples.torus_surface()
-    unrefined = Work.of(small, refine=False)
+    unrefined = Work.of(small, Budget(np.inf), refine=False)
     assert unrefined.most == unrefined.steps() > most
+
+
+def test_work_counts_what_elimination_takes() -> None:
+    long, square = sm.samples.torus_surface(640, 10), sm.samples.torus_surface(80, 80)
+    steps = []
+    for surface in (long, square):
+        start = start_of(surface)
+        newton, work = start.newton(), Work.of(surface, Budget(np.inf), refine=True)
+        work.begin(newton, surface.n_faces)
+        steps.append(work.steps())
+    assert steps[0] > 1.1 * steps[1]  # thin separators
+
+
+def test_steps_end_with_the_time_there_is() -> None:
+    surface = sm.samples.torus_surface(100, 80)
+    work = Work.of(surface, Budget(0.4), refine=True)
+    most = work.steps()
+    work.begin(None, surface.n_faces)
+    end = time.process_time() + 0.1
+    while time.process_time() < end:
+        pass
+    work.spend(5)
+    assert work.steps() < 0.2 * most and work.hurried  # five took a tenth of a second
+    while time.process_time() < end + 0.3:
+        pass
+    assert work.steps(least=10) == 0
 
 
 def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> None:

@@ -12,11 +12,11 @@ from shapes import cubes, mug, with_branch
 from stretchmap.area import finish
 from stretchmap.area.coarse import Level
 from stretchmap.area.map import finished, turned
+from stretchmap.base.budget import Budget
 from stretchmap.errors import DegenerateError
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import certified, engine
 from stretchmap.volume.boundary_starts import boundary_starts
-from stretchmap.volume.budget import Budget
 from stretchmap.volume.minimize import minimize
 from stretchmap.volume.model import GLIDING, History
 from stretchmap.volume.options import VolumeOptions

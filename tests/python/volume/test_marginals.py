@@ -7,7 +7,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import _core, samples
-from stretchmap.volume.budget import Budget
+from stretchmap.base.budget import Budget
 from stretchmap.volume.equalize import equalize, gently_moved
 from stretchmap.volume.marginals import Marginals
 from stretchmap.volume.model import History

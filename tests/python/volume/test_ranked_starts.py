@@ -13,12 +13,12 @@ import stretchmap as sm
 from shapes import mug
 from stretchmap.area import route
 from stretchmap.area.balance import balance_areas
+from stretchmap.base.budget import Budget
 from stretchmap.errors import SolverError
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import certified
 from stretchmap.volume import ranked_starts as module
 from stretchmap.volume.boundary_starts import boundary_starts
-from stretchmap.volume.budget import Budget
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import Outcome
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from stretchmap.base.budget import Budget
 from stretchmap.volume import engine, untangle
-from stretchmap.volume.budget import Budget
 from stretchmap.volume.glide_relax import Relaxation
 from stretchmap.volume.model import History
 from stretchmap.volume.options import VolumeOptions

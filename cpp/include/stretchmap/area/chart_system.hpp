@@ -27,7 +27,12 @@ class ChartSystem {
   // \throws Error "SolverError" when the factorization breaks down.
   Vec solve(const Rows& hessians, const Vec& gradient, const Poll& poll);
 
+  // Of the elimination in each solve.
+  double flops() { return solver().flops(); }
+
  private:
+  linalg::BlockLdlt<2>& solver();
+
   SurfacePattern pattern_;
   double ridge_;
   std::optional<linalg::BlockLdlt<2>> solver_;

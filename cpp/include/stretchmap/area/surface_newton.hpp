@@ -37,10 +37,14 @@ class SurfaceNewton {
   // As least_facing.
   double facing() const { return least_facing(problem_, angles_); }
 
+  // Of the elimination in a step.
+  double flops();
+
   const Points2& angles() const { return angles_; }
   const GlideProblem& problem() const { return problem_; }
 
  private:
+  ChartSystem& system();
   double longest_step(const Points2& direction) const;
 
   GlideProblem problem_;

@@ -24,6 +24,9 @@ class BlockLdlt {
   // \throws Error "SolverError" for a pivot that is zero or not finite.
   void factorize(const SparseMatrix& A, const Poll& poll = {});
 
+  // Multiplications and additions of a factorize, those that fill the dense fronts left out.
+  double flops() const;
+
   // Lets the numbers go until the next factorize.
   void let_go() { values_.reset(); }
 

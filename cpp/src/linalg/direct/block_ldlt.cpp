@@ -78,6 +78,17 @@ void BlockLdlt<K>::find_borders(const SparseMatrix& A) {
   }
 }
 
+template <int K>
+double BlockLdlt<K>::flops() const {
+  double sum = 0.0;
+  for (const Front& front : fronts_)
+    for (Index k = 0; k < K * front.own(); ++k) {
+      const double below = static_cast<double>(K * front.size() - k - 1);
+      sum += below * (below + 1.0);
+    }
+  return sum;
+}
+
 // Subtrees of moderate size, each for one thread; the few large fronts above them are for all.
 template <int K>
 void BlockLdlt<K>::group_fronts() {

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import time
 
-from .options import FillOptions
-
 __all__ = ["Budget", "Spent"]
 
 _LEAST_SECONDS, _MARGIN = 4.5, 0.9  # a stage under way is ended
@@ -28,9 +26,9 @@ class Budget:
         self._end = time.process_time() + seconds
 
     @classmethod
-    def of(cls, options: FillOptions, n_tets: int) -> Budget:
-        """What the options allow for a mesh of that many tets; some seconds for a small one."""
-        return cls(max(_LEAST_SECONDS, _MARGIN * options.time_limit * n_tets))
+    def of(cls, time_limit: float, n_elements: int) -> Budget:
+        """For a mesh of so many elements with that limit for each; some seconds for a small one."""
+        return cls(max(_LEAST_SECONDS, _MARGIN * time_limit * n_elements))
 
     def share(self, part: float) -> Budget:
         """A part of what is left."""
