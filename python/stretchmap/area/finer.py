@@ -39,7 +39,6 @@ _log = logging.getLogger("stretchmap")
 
 _SAG = 1.0  # most sag of an edge, over the heights its faces are to have above it
 _FAR, _MANY = 2.0, 0.005  # more than this share of the edges with more sag than that: too coarse
-_SLIVER = 3.0  # times the median: longer faces are given the height they would have at that
 _GROWTH, _SPARE = 2.5, 12_000  # most faces: so many times those of the input, and so many more
 _BENT = 0.5  # least share of its area that a face may keep when the flat chart is bent
 _PASSES = 14
@@ -130,21 +129,29 @@ class Finer:
         return Torus(self.ratio, 1.0).xi(*self.angles.T)
 
     def sags(self) -> NDArray[np.float64]:
-        """(e,) sag of each edge over the least height its faces are to have above it."""
+        """(e,) how far each edge sags where a face's third corner is, over the height of that.
+
+        Of its two faces that where it is more. At the ends it does not sag: both long edges of a
+        needle can lie deep below the torus and the needle be as thin as it is to be.
+        """
         surface, torus = self.level.surface, Torus(self.ratio, 1.0)
         edge = surface.topology.edge.reshape(-1, 3)
         i, j = surface.edges.T
-        ends = self.image[surface.edges]
+        image = self.image
+        ends = image[surface.edges]
         change = self.angles[j] - self.angles[i] + TWO_PI * self.level.forms.T
         over = torus.xi(*(self.angles[i] + 0.5 * change).T)
         sag = np.linalg.norm(over - ends.mean(axis=1), axis=1)
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        areas = surface.face_areas
-        slender = _slender(surface)
-        wanted = areas * np.maximum(slender / (_SLIVER * np.median(slender)), 1.0)
-        wanted *= torus.area / areas.sum()
+        wanted = surface.face_areas * (torus.area / surface.face_areas.sum())
         found = np.zeros(len(surface.edges))
-        np.maximum.at(found, edge, (sag * length)[edge] / (2.0 * wanted)[:, None])
+        corners = image[surface.F]
+        along = np.roll(corners, -1, axis=1) - corners
+        across = np.roll(corners, -2, axis=1) - corners
+        foot = (across * along).sum(axis=2) / np.maximum((along**2).sum(axis=2), np.finfo(float).tiny)
+        foot = np.clip(foot, 0.0, 1.0)
+        there = 4.0 * foot * (1.0 - foot)  # of the sag in the middle
+        np.maximum.at(found, edge, there * (sag * length)[edge] / (2.0 * wanted)[:, None])
         return found
 
     def halved(self, marked: NDArray[np.bool_]) -> Finer:
