@@ -50,7 +50,9 @@ ChartNewton::Targets ChartNewton::targets(double reach) const {
   const Eigen::ArrayXd ratio = image.array() / reference_.areas.array();
   // Over the source's area: the ratio itself, brought within `reach` of one step from 1.
   const Eigen::ArrayXd next = ratio * ratio.inverse().min(reach).max(1.0 / reach);
-  return {next, 0.5 * (image + reference_.areas)};
+  const double each = 1.0 / static_cast<double>(image.size());
+  const Eigen::ArrayXd evened = each * (reference_.areas.array() / each).pow(1.0 / 3.0);
+  return {next, 0.5 * (image.array() + evened)};
 }
 
 Matrix2d ChartNewton::rest(const Targets& targets, Index f) const {

@@ -148,7 +148,9 @@ class Finer:
         corners = image[surface.F]
         along = np.roll(corners, -1, axis=1) - corners
         across = np.roll(corners, -2, axis=1) - corners
-        foot = (across * along).sum(axis=2) / np.maximum((along**2).sum(axis=2), np.finfo(float).tiny)
+        foot = (across * along).sum(axis=2) / np.maximum(
+            (along**2).sum(axis=2), np.finfo(float).tiny
+        )
         foot = np.clip(foot, 0.0, 1.0)
         there = 4.0 * foot * (1.0 - foot)  # of the sag in the middle
         np.maximum.at(found, edge, there * (sag * length)[edge] / (2.0 * wanted)[:, None])
@@ -225,12 +227,13 @@ class Finer:
         self, progress: Progress | None, work: Work
     ) -> tuple[Finer, Pace, list[IterationRecord]]:
         """With areas nearly right, edges that sag too much meanwhile halved, too; pace, records."""
-        finer, history = self, []
+        finer, pace, history = self, Pace(), []
         for most in _APPROACH:
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
             work.begin(newton, n_faces)
             affordable = max(work.steps(n_faces) - _LEAST_STEPS, 0)
-            records, pace = approach_areas(newton, min(most, affordable), progress)
+            records, reached = approach_areas(newton, min(most, affordable), progress)
+            pace = max(pace, reached, key=lambda each: each.weight)
             work.spend_on_approach(len(records), n_faces)
             history += records
             finer = replace(finer, angles=newton.angles)

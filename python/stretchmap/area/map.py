@@ -25,7 +25,7 @@ from ..maps.history import IterationRecord
 from ..mesh.given import as_surface, require_same_mesh
 from ..mesh.halved_faces import SurfaceRefinement
 from .coarse import Level, levels
-from .finer import Finer, goal, has_slivers, mapped_finer
+from .finer import Finer, goal, mapped_finer
 from .finish import Steps, cut_short, finish_areas, unfolded
 from .flat import unfolded_turns
 from .result import AreaMap
@@ -44,10 +44,9 @@ _MOST_TURNS = 1e3  # a phase may have
 # Weights of shape in the chart where equal areas leave faces folded: few edges round a branch span
 # so much of the torus then that what lies between two rounds of them is cut off.
 SHAPES = (1.0, 10.0, 100.0, 1e3)
-# The same where the surface is to become finer. Its areas are far from equal in such a chart, so
-# edges are halved for good only once they are nearly right: until then up to that sag is left.
-# Slivers have no shape to keep, and lose their areas to the others'.
-_EASED, _SLIVERS_EASED = (0.1, 0.3, 1.0), (0.01, 0.1, 1.0)
+# The same where the surface is to become finer. Areas are less equal in such a chart, so edges are
+# halved for good only once they are nearly right: until then up to that sag is left.
+_EASED = (0.01, 0.1, 1.0)
 _COARSELY = 1.5
 
 
@@ -239,7 +238,7 @@ def _finest(
     surface, finer = equal.level.surface, None
     wanted = goal(surface, route.steps.tol)
     if refine:
-        finer = _finer_at_once(route, equal, progress, torus, work)
+        finer = _finer_at_once(route, equal, wanted, progress, torus, work)
         if finer is not None and finer.certificate.certified:
             return finer
     found = _along(route, stack, equal, conformal, progress, torus, work)
@@ -251,7 +250,7 @@ def _finest(
             found.angles, found.phase, found.ratio, list(found.history),
             found.converged, found.stop_reason, dict(found.seconds),
         )  # fmt: skip
-        finer = _finer(route, start, made, progress, torus, work)
+        finer = _finer(route, start, made, wanted, progress, torus, work)
     if finer is None or not finer.certificate.certified:
         return found
     if not found.certificate.certified:
@@ -260,7 +259,12 @@ def _finest(
 
 
 def _finer_at_once(
-    route: Route, equal: EqualAreas, progress: Progress | None, torus: Torus | None, work: Work
+    route: Route,
+    equal: EqualAreas,
+    wanted: float,
+    progress: Progress | None,
+    torus: Torus | None,
+    work: Work,
 ) -> AreaMap | None:
     """The map of a finer surface, if this one is too coarse for its place in the chart.
 
@@ -273,7 +277,7 @@ def _finer_at_once(
     work.spend_in_chart(sum(record.stage == "balance" for record in records))
     if not Finer.wrapped(level, turns, phase, ratio).too_coarse():
         return None
-    for shape in _SLIVERS_EASED if has_slivers(level.surface) else _EASED:
+    for shape in _EASED:
         turns, more = equal.eased(shape, turns)
         records = records + more
         work.spend_in_chart(len(more))
@@ -284,7 +288,7 @@ def _finer_at_once(
         if finer is not None:
             seconds = {"sem": time.perf_counter() - clock}
             made = Made(finer.angles, phase, ratio, records, seconds=seconds)
-            found = _finer(route, finer, made, progress, torus, work)
+            found = _finer(route, finer, made, wanted, progress, torus, work)
             if found is not None:
                 return found
     return None
@@ -294,11 +298,12 @@ def _finer(
     route: Route,
     start: Finer,
     made: Made,
+    wanted: float,
     progress: Progress | None,
     torus: Torus | None,
     work: Work,
 ) -> AreaMap | None:
-    rings, wanted = route.finish == "ring", goal(start.level.surface, route.steps.tol)
+    rings = route.finish == "ring"
     found = mapped_finer(start, made, route.steps, wanted, rings, progress, work)
     if found is None:
         return None

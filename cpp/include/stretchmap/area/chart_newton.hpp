@@ -6,8 +6,10 @@
 // with K the Jacobian from the source triangle enlarged to the area its image is to have next: the
 // source's own share of the total, but no more than a factor `reach` away from the image's. So no
 // face is asked for more than a Newton step can do, and the areas of far too small faces grow by
-// that factor in every step. w_f is the mean of the shares of source and image: with the source's
-// alone the few faces that hold most of the chart at first cost nothing and are crushed.
+// that factor in every step. w_f is the mean of the image's share and of the cube root of the
+// source's, m faces of 1/m each having 1/m: with the source's alone the few faces that hold most of
+// the chart at first cost nothing and are crushed; with its share itself slivers of no area are led
+// anywhere, and end all later steps.
 #pragma once
 
 #include "stretchmap/area/chart.hpp"
