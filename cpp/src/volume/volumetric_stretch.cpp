@@ -50,9 +50,10 @@ linalg::SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c
     laplacian_.assemble(geometry, c, x, solver_->matrix(), rhs_);
   }
   const IndexVec& interior = laplacian_.interior();
-  unknowns_.resize(interior.size(), 3);
+  unknowns_.resize(static_cast<Eigen::Index>(interior.size()), 3);
   const Index n = static_cast<Index>(interior.size());
   for_rows(n, [&](Index i) { unknowns_.row(i) = x.row(interior[i]); });
+  if (backend() != "direct") start_.improve(solver_->matrix(), rhs_, unknowns_);
   linalg::SolveReport report;
   if (solves_++ < kSettling || worn_ || backend() == "direct") {
     if (!first) solver_->refactor();

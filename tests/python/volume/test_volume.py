@@ -170,6 +170,28 @@ def test_vsem_step_solves_the_paper_system(bumpy, c):
     assert max(solved.residual) < 1e-12
 
 
+def test_vsem_steps_start_where_the_last_ones_lead():
+    """Steps change ever more alike: what the last three did spares most iterations, no accuracy."""
+    solid = sm.samples.vertebra_like(12_000)
+    V, T, fixed = solid.V / solid.volume ** (1 / 3), solid.T, boundary_flags(solid)
+    rest = _core.mesh.tet_volumes(V, T)
+    start = V * [1.3, 1.0, 0.8] + 0.1 * np.sin(3.0 * V[:, [1, 2, 0]])
+    iterations, exact = [], []
+    iterative, direct = (
+        _core.volume.VolumetricStretch(T, fixed, rest, backend)
+        for backend in ("multigrid", "direct")
+    )
+    x, _ = iterative.harmonic(V, start, 1e-10)
+    y, _ = direct.harmonic(V, start, 1e-10)
+    for _ in range(12):
+        x, solved = iterative.step(x, 10.0, 1e-9)
+        y, _ = direct.step(y, 10.0, 1e-9)
+        iterations.append(solved.iterations)
+        exact.append(np.abs(x - y).max())
+    assert max(iterations[8:]) <= 0.6 * max(iterations[:3])
+    assert max(exact) < 1e-7
+
+
 def test_vsem_energy_falls_at_every_step_and_flips_are_reported(bumpy):
     result = sm.volume_map(bumpy, c=0.0, max_iter=8, options=sm.VolumeOptions(tol=0.0))
     energies = [record.energy for record in result.history]
@@ -255,7 +277,7 @@ def test_a_boundary_map_is_no_map_of_all_where_no_vertex_is_inside(size):
     result = sm.volume_map(solid, start=start)
     assert result.converged or "are held" in result.stop_reason
     assert "frozen" in {record.stage for record in result.history}
-    assert result.distortion.element_std < 0.2
+    assert result.distortion.element_std < 0.3
     again = sm.volume_map(result.mesh, start=result)
     assert "frozen" not in {record.stage for record in again.history}
 

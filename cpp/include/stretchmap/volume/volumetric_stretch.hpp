@@ -5,6 +5,7 @@
 #include <string>
 
 #include "stretchmap/linalg/spd_solver.hpp"
+#include "stretchmap/linalg/successive_start.hpp"
 #include "stretchmap/volume/tet_laplacian.hpp"
 
 namespace stretchmap::volume {
@@ -40,7 +41,8 @@ class VolumetricStretch {
   std::string wanted_backend_;
   std::unique_ptr<linalg::SpdSolver> solver_;
   Points rhs_;
-  Rows unknowns_;
+  Points unknowns_;
+  linalg::SuccessiveStart start_;
   int solves_ = 0;    // so far
   int fresh_ = 0;     // iterations of the first solve after the preconditioner was renewed
   bool worn_ = true;  // whether the last solve took clearly more than that
