@@ -1,8 +1,8 @@
 """Surfaces too coarse for their place on the torus: edges halved until flat faces can lie there.
 
 Few edges round a branch or round a small hole have to span the torus, and a flat face is no thinner
-than the sag below the arc over its longest edge: its area cannot be right, and where it is much too
-coarse it looks inward.
+than its edges sag, where its third corner is, below the arcs over them: its area cannot be right,
+and where it is much too coarse it looks inward.
 """
 
 from __future__ import annotations

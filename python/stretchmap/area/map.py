@@ -154,10 +154,10 @@ def area_map(
     A surface of more than 40,000 faces is first mapped with fewer, by removing vertices; a step of
     stretch energy minimisation and a few Newton steps follow on the surface itself.
 
-    A flat face is no thinner than the sag below the arc over its longest edge. Where many edges sag
-    by more than twice the height their faces are to have, all that sag too much are halved in the
-    chart before anything else, which is eased towards shapes for it, further where that takes too
-    many faces. Newton steps that let faces look inward lead to nearly right areas, edges that sag
+    A flat face is no thinner than its edges sag, where its third corner is, below the arcs over
+    them. Where many sag by more than twice the height their faces are to have, all that sag too
+    much are halved in the chart before anything else, which is eased a little towards shapes for
+    it, further where that takes too many faces. Newton steps that let faces look inward lead to nearly right areas, edges that sag
     too much by then are halved, too, as are those of faces left looking inward; then the steps
     above follow. Where areas stay off, the edges that sag most in faces that are off are halved,
     three times at most. All steps together cost no more than some two hundred on the surface
