@@ -157,11 +157,12 @@ def area_map(
     A flat face is no thinner than its edges sag, where its third corner is, below the arcs over
     them. Where many sag by more than twice the height their faces are to have, all that sag too
     much are halved in the chart before anything else, which is eased a little towards shapes for
-    it, further where that takes too many faces. Newton steps that let faces look inward lead to nearly right areas, edges that sag
-    too much by then are halved, too, as are those of faces left looking inward; then the steps
-    above follow. Where areas stay off, the edges that sag most in faces that are off are halved,
-    three times at most. All steps together cost no more than some two hundred on the surface
-    itself, more on one of less than 4,000 faces, and no more than ``time_limit``.
+    it, further where that takes too many faces. Newton steps that let faces look inward lead to
+    nearly right areas, edges that sag too much by then are halved, too, as are those of faces left
+    looking inward; then the steps above follow. Where areas stay off, the edges that sag most in
+    faces that are off are halved, three times at most. All steps together cost no more than some
+    two hundred on the surface itself, more on one of less than 4,000 faces, and no more than
+    ``time_limit``.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
