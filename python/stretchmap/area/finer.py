@@ -44,12 +44,13 @@ _BENT = 0.5  # least share of its area that a face may keep when the flat chart 
 _PASSES = 14
 _MORE = 3  # times as many faces that look inward as before: halving edges does not help
 _APPROACH = 10, 10, 10  # most steps towards areas, edges that sag too much halved after each
+_HOPELESS = 0.5  # face SD after the first of them, from which on others lead no nearer
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
 _LEAST_STEPS = 10  # from where areas are nearly right, however little work is left
 _STEPS = 20  # of each round; fewer are not worth it
-_UNFOLDING = (1 / 4, (5, 25))  # a share of the work, and steps, until no face is folded
+_UNFOLDING = (0.6, (10, 60))  # a share of the work, and steps, until no face is folded
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -237,8 +238,11 @@ class Finer:
             work.spend_on_approach(len(records), n_faces)
             history += records
             finer = replace(finer, angles=newton.angles)
+            far = newton.measures().face_std > _HOPELESS
             finer = finer.fitted() or finer.outward()
             work.spend_on_fitting(finer.level.surface.n_faces)
+            if far:
+                break
         return finer, pace, history
 
     def newton(self) -> _core.area.SurfaceNewton:

@@ -15,6 +15,7 @@ from ..base.progress import Progress, report
 from ..errors import DegenerateError
 from ..maps.history import IterationRecord
 from .coarse import Level
+from .work import Work
 
 # Weights of the finishing energy against which the area term grows.
 _SHAPE = 0.1
@@ -55,24 +56,37 @@ def unfolded(
     *,
     keep: bool = False,
     most: int | None = None,
+    work: Work | None = None,
 ) -> tuple[_core.area.SurfaceNewton, list[IterationRecord]]:
     """What goes on from there, every face looking outward if steps lead there; records.
 
     Faces too coarse for their place turn inward when the flat chart is wrapped round the torus.
     Either all are to get equal areas meanwhile; or, if that leaves some folded or with ``keep``, to
-    keep what area and shape they have there, which takes few steps and folds no others.
+    keep what area and shape they have there, which takes few steps and folds no others. Steps are
+    taken from ``work``, and none for which it has no time.
     """
+
+    def unfold(newton: _core.area.SurfaceNewton, most: int) -> list[IterationRecord]:
+        if work is None:
+            return unfold_faces(newton, most, progress)
+        work.begin(newton, level.surface.n_faces)
+        found = unfold_faces(
+            newton, work.steps(level.surface.n_faces, least=most, most=most), progress
+        )
+        work.spend(len(found), level.surface.n_faces)
+        return found
+
     newton = level.newton(angles, ratio)
     if newton.least_facing() > 0.0:
         return newton, []
-    tried = [] if keep else unfold_faces(newton, UNFOLD_STEPS if most is None else most, progress)
+    tried = [] if keep else unfold(newton, UNFOLD_STEPS if most is None else most)
     if newton.least_facing() > 0.0:
         return newton, tried
     try:
         keeping = level.keeping(angles, ratio)
     except DegenerateError:  # a face whose area is lost in rounding cannot keep it
         return newton, tried
-    history = unfold_faces(keeping, _KEEPING_STEPS, progress)
+    history = unfold(keeping, _KEEPING_STEPS)
     if keeping.least_facing() > 0.0 or keep:
         newton = level.newton(keeping.angles, ratio)
     # They compare areas with those to be kept.

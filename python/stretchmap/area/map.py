@@ -279,6 +279,8 @@ def _finer_at_once(
     if not Finer.wrapped(level, turns, phase, ratio).too_coarse():
         return None
     for shape in _EASED:
+        if work.clock.spent:
+            return None
         turns, more = equal.eased(shape, turns)
         records = records + more
         work.spend_in_chart(len(more))

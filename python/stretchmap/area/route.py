@@ -148,15 +148,12 @@ def _climb(
         if level.coarse is not None:
             made.angles = level.prolonged(made.angles, ratio)
             pace = pace.finer()
-        most = FEW_UNFOLD_STEPS if finest else None
-        if finest:
-            work.begin(None, work.n_faces)
+        most, keep = FEW_UNFOLD_STEPS if finest else None, route.shape > 0.0
         newton, unfolding = unfolded(
-            level, made.angles, ratio, progress, keep=route.shape > 0.0, most=most
+            level, made.angles, ratio, progress, keep=keep, most=most, work=work if finest else None
         )
         made.add(unfolding, finest)
         if finest:
-            work.spend(len(unfolding))
             if not newton.least_facing() > 0.0:
                 made.angles, made.converged, made.reason = newton.angles, False, "faces stay folded"
                 break

@@ -94,15 +94,15 @@ class Work:
         """The projection of the rings of a surface of so many faces."""
         self.spend(RINGS, n_faces)
 
-    def steps(self, n_faces: int | None = None, *, least: int = 0) -> int:
+    def steps(self, n_faces: int | None = None, *, least: int = 0, most: float = math.inf) -> int:
         """Newton steps that can be afforded on a surface of so many faces.
 
-        At least so many, if there is time for them.
+        At least so many, if there is time for them, and at most so many.
         """
         cost = self._cost(n_faces or self.n_faces)
-        units, in_time = max(self.left, least * cost), self._in_time()
+        units, in_time = min(max(self.left, least * cost), most * cost), self._in_time()
         self.hurried = self.hurried or in_time < units
-        return max(int(min(units, in_time) / cost), 0)
+        return max(int(min(units, in_time) / cost + 1e-9), 0)
 
     def _cost(self, n_faces: int) -> float:
         """Of a step."""
