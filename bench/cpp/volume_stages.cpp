@@ -110,7 +110,7 @@ void vsem_stages(const SolidTorus& solid, const Problem& p, const Settings& sett
       row_name("volume.vsem", solid, settings),
       [&] {
         for (int step = 0; step < settings.vsem_steps; ++step) {
-          solved = stretch.step(x, settings.c, options);
+          solved = stretch.step(x, settings.c, true, options);
           residual = std::max(residual, solved.residual.maxCoeff());
           cg += solved.iterations;
         }

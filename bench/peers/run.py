@@ -48,7 +48,7 @@ def ours(V: Any, T: Any, fixed: Any, start: Any, c: float, steps: int) -> tuple[
     tol = step_tolerance(np.inf, energy)
     begin = time.perf_counter()
     for _ in range(steps):
-        x, _ = stretch.step(x, c, tol)
+        x, _ = stretch.step(x, c, tol, follow=True)
         before, energy = energy, energy_of(x)
         tol = step_tolerance(before, energy)
     return x, time.perf_counter() - begin

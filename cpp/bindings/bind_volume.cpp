@@ -36,12 +36,13 @@ void bind_stretch(py::module_& m) {
           py::arg("max_iter") = 1000, release_gil())
       .def(
           "step",
-          [](VolumetricStretch& self, Points x, double c, double tol, int max_iter) {
-            const auto report = self.step(x, c, solve_options(tol, max_iter), signal_poll());
+          [](VolumetricStretch& self, Points x, double c, double tol, int max_iter, bool follow) {
+            const auto report =
+                self.step(x, c, follow, solve_options(tol, max_iter), signal_poll());
             return std::make_pair(std::move(x), report);
           },
           py::arg("x"), py::arg("c"), py::arg("tol") = 1e-10, py::arg("max_iter") = 1000,
-          release_gil());
+          py::arg("follow") = false, release_gil());
   m.def("tet_stretch_energy", &tet_stretch_energy, py::arg("image_volumes"),
         py::arg("rest_volumes"), release_gil());
 }

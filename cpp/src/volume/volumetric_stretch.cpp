@@ -37,8 +37,8 @@ linalg::SolveReport VolumetricStretch::solve_kept(const linalg::SolveOptions& op
   return report;
 }
 
-linalg::SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c, Points& x,
-                                             const linalg::SolveOptions& options,
+linalg::SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c, bool follow,
+                                             Points& x, const linalg::SolveOptions& options,
                                              const Poll& poll) {
   const bool first = !solver_;
   if (first) {
@@ -53,7 +53,7 @@ linalg::SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c
   unknowns_.resize(static_cast<Eigen::Index>(interior.size()), 3);
   const Index n = static_cast<Index>(interior.size());
   for_rows(n, [&](Index i) { unknowns_.row(i) = x.row(interior[i]); });
-  if (backend() != "direct") start_.improve(solver_->matrix(), rhs_, unknowns_);
+  if (follow && backend() != "direct") start_.improve(solver_->matrix(), rhs_, unknowns_);
   linalg::SolveReport report;
   if (solves_++ < kSettling || worn_ || backend() == "direct") {
     if (!first) solver_->refactor();
@@ -70,12 +70,12 @@ linalg::SolveReport VolumetricStretch::solve(const PointsRef& geometry, double c
 linalg::SolveReport VolumetricStretch::harmonic(const PointsRef& source, Points& x,
                                                 const linalg::SolveOptions& options,
                                                 const Poll& poll) {
-  return solve(source, 0.0, x, options, poll);
+  return solve(source, 0.0, false, x, options, poll);
 }
 
-linalg::SolveReport VolumetricStretch::step(Points& x, double c,
+linalg::SolveReport VolumetricStretch::step(Points& x, double c, bool follow,
                                             const linalg::SolveOptions& options, const Poll& poll) {
-  return solve(x, c, x, options, poll);
+  return solve(x, c, follow, x, options, poll);
 }
 
 }  // namespace stretchmap::volume

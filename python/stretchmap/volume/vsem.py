@@ -18,9 +18,9 @@ from .problem import Outcome, VolumeProblem
 
 __all__ = ["VsemRun", "minimize_volumetric_stretch", "run_vsem"]
 
-# Relative residuals asked of the linear solves. A step starts from the last one's solution, and
-# what it leaves open the next one makes good; the less the last step changed the energy, the more
-# exact the next one has to be. After 20 steps the energy agrees to 1e-7 with that of exact solves.
+# Relative residuals asked of the linear solves. A step starts where the last ones lead, and what it
+# leaves open the next one makes good; the less the last step changed the energy, the more exact the
+# next one has to be. After 20 steps the energy agrees to 1e-7 with that of exact solves.
 HARMONIC_TOL = 1e-8
 _STEP_SHARE = 2e-5
 _STEP_TOL = (1e-9, 1e-6)
@@ -126,7 +126,7 @@ def minimize_volumetric_stretch(
     energy = record(x, 0, residual)
     step_tol = step_tolerance(math.inf, energy)
     for iteration in range(1, max_iter + 1):
-        moved, solved = stretch.step(x, c, step_tol)
+        moved, solved = stretch.step(x, c, step_tol, follow=True)
         x, before = moved, energy
         energy = record(x, iteration, float(max(solved.residual, default=0.0)))
         if energy > before:

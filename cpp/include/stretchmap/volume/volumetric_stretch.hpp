@@ -26,7 +26,8 @@ class VolumetricStretch {
 
   // One step of (5.5), warm-started from x.
   // \param c >= 0 the regularization of (5.6).
-  linalg::SolveReport step(Points& x, double c, const linalg::SolveOptions& options,
+  // \param follow whether to start where the steps that led to x lead, all made with it.
+  linalg::SolveReport step(Points& x, double c, bool follow, const linalg::SolveOptions& options,
                            const Poll& poll = {});
 
   // As in SpdOptions, not "auto"; empty before the first solve.
@@ -34,7 +35,7 @@ class VolumetricStretch {
 
  private:
   linalg::SolveReport solve_kept(const linalg::SolveOptions& options, const Poll& poll);
-  linalg::SolveReport solve(const PointsRef& geometry, double c, Points& x,
+  linalg::SolveReport solve(const PointsRef& geometry, double c, bool follow, Points& x,
                             const linalg::SolveOptions& options, const Poll& poll);
 
   TetLaplacian laplacian_;
