@@ -211,6 +211,7 @@ PARAMETERS: dict[str, Parameter] = {
     "compact": ("flag", value(False)),
     "vertex_exact": ("flag", value(False)),
     "refine": ("flag", value(True)),
+    "area_map.time_limit": ("positive", value(1e-3)),
     "keep_best": ("flag", value(True)),
     "correct": ("flag", value(True)),
     "repair": ("flag", value(True)),

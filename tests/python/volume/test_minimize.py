@@ -114,4 +114,4 @@ def test_growing_step_by_step_takes_fewer_steps(monkeypatch):
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
     by_steps = gliding_steps()
     monkeypatch.setattr(minimizing, "_EVEN", np.inf)
-    assert by_steps < 0.75 * gliding_steps()
+    assert by_steps < 0.85 * gliding_steps()
