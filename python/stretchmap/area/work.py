@@ -60,14 +60,13 @@ class Work:
             work.most = work.steps()
         return work
 
-    def begin(self, newton: _core.area.SurfaceNewton | None, n_faces: int) -> None:
+    def begin(self, newton: _core.area.SurfaceNewton, n_faces: int) -> None:
         """Steps, of which the next `spend` tells how many they were.
 
         What its elimination takes, which separators tell, holds for finer surfaces, too.
         """
         self._begun = time.process_time()
-        if newton is not None:
-            self._flops = newton.flops() / n_faces**1.5
+        self._flops = newton.flops() / n_faces**1.5
 
     def spend(self, steps: float, n_faces: int | None = None) -> None:
         """Newton steps on a surface of so many faces."""

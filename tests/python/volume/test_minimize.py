@@ -106,12 +106,14 @@ def plates() -> list[sm.TetMesh]:
     return found
 
 
-def test_growing_step_by_step_takes_fewer_steps(monkeypatch):
-    def gliding_steps() -> int:
-        stages = [r.stage for plate in plates() for r in sm.volume_map(plate).history]
-        return stages.count("glide")
+def test_growing_step_by_step_takes_fewer_steps_to_better_volumes(monkeypatch):
+    def steps_and_error() -> tuple[int, float]:
+        maps = [sm.volume_map(plate) for plate in plates()]
+        stages = [record.stage for each in maps for record in each.history]
+        return stages.count("glide"), sum(each.distortion.element_std for each in maps)
 
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
-    by_steps = gliding_steps()
+    steps, error = steps_and_error()
     monkeypatch.setattr(minimizing, "_EVEN", np.inf)
-    assert by_steps < 0.85 * gliding_steps()
+    steps_at_once, error_at_once = steps_and_error()
+    assert steps < 0.85 * steps_at_once and error < 0.85 * error_at_once
