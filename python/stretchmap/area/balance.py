@@ -19,7 +19,7 @@ from .coarse import Level
 
 # Excess of E_S over its bound, the variance of the ratios, up to which (4.5) has done its work.
 JAMMED = 1e-2
-_STEPS = 100
+_STEPS = 250
 _SHAPE = 0.1  # weight of the shape term, that of the area term being one
 _GROWTH, _MOST_WEIGHT = 4.0, 64.0  # of the area term against it
 _REACH, _MOST_REACH = 4.0, 1e6  # factors of area asked for in one step

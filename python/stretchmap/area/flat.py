@@ -14,6 +14,7 @@ from ..base.arrays import describe
 from ..base.torus import TWO_PI
 from ..conformal.map import ConformalMap
 from ..errors import SolverError
+from .limbs import spread_limbs
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
@@ -30,15 +31,30 @@ _SAFE = 1e-8  # share of its area that a face keeps in a flat map that has not l
 def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.float64]:
     """The conformal map's turns or, if it has folds, those of a map that has none.
 
-    Positive weights embed the surface in a flat torus whatever its triangles (Tutte). But a long
-    limb shrinks with every radius outward by the factor e, until its tip is lost in rounding. Where
-    weights fall by exp(-a) meanwhile, sizes fall by exp((a - sqrt(a^2 + 4)) / 2) only, nearly
-    exp(-1 / a).
+    Positive weights embed the surface in a flat torus whatever its triangles (Tutte), but for
+    limbs whose tips are lost in rounding. Those are spread, or else weights fall along them.
     """
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
     if (_core.area.turn_areas(chart, conformal.turns) > 0.0).all():
         return conformal.turns
     forms = conformal.forms.astype(float)
+    turns, before = _embedded(surface, np.ones(len(surface.edges)), forms), None
+    while turns is not before:
+        if (_core.area.turn_areas(chart, turns) > _LEAST_AREA).all():
+            return turns
+        before = turns
+        turns = spread_limbs(surface, chart, turns, forms, conformal.aspect, _LEAST_AREA)
+    return _weighted_turns(surface, chart, forms)
+
+
+def _weighted_turns(
+    surface: TriMesh, chart: _core.area.SurfaceChart, forms: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Turns by weights that fall along limbs.
+
+    Where weights fall by exp(-a) with every radius outward, sizes fall by
+    exp((a - sqrt(a^2 + 4)) / 2) only, nearly exp(-1 / a), instead of by e.
+    """
     share = surface.face_areas / surface.face_areas.sum()
     weights, kept = np.ones(len(surface.edges)), None
     areas = np.zeros_like(share)

@@ -15,6 +15,7 @@ from stretchmap import _core
 from stretchmap.area import finish
 from stretchmap.area import map as area
 from stretchmap.area.flat import unfolded_turns
+from stretchmap.area.limbs import spread_limbs
 from stretchmap.errors import CertificationError, SolverError
 
 
@@ -39,6 +40,43 @@ def test_a_folded_start_is_replaced_by_one_without_folds(ahead):
     folded = dataclasses.replace(conformal, turns=conformal.turns + noise)
     assert _core.area.turn_areas(chart, folded.turns).min() < 0.0
     assert (_core.area.turn_areas(chart, unfolded_turns(surface, folded)) > 0.0).all()
+
+
+def halved(surface: sm.TriMesh) -> sm.TriMesh:
+    """Four faces for one, so that twelve edges run round a limb."""
+    V = np.vstack([surface.V, surface.V[surface.edges].mean(axis=1)])
+    (a, b, c), (x, y, z) = surface.F.T, surface.topology.edge.reshape(-1, 3).T + len(surface.V)
+    faces = [(a, x, z), (b, y, x), (c, z, y), (x, y, z)]
+    return sm.TriMesh(V, np.vstack([np.column_stack(corners) for corners in faces]))
+
+
+def limb_on_limb() -> sm.TriMesh:
+    """A limb, and another one from a third of its way."""
+    surface = limb(100)
+    at = len(surface.V) - 200
+    turned = sm.TriMesh(np.roll(surface.V, -at, axis=0), (surface.F - at) % len(surface.V))
+    return with_limb(turned, 60, 0.12)
+
+
+@pytest.mark.parametrize("surface", [limb(200), limb_on_limb()], ids=["one", "two"])
+def test_limbs_of_many_girths_are_spread(surface):
+    """Tutte's map loses thousands of their faces in rounding, the spread one none."""
+    surface = halved(surface)
+    conformal = sm.conformal_map(surface)
+    chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
+    weights, forms = np.ones(len(surface.edges)), conformal.forms.astype(float)
+    turns = _core.forms.harmonic_forms(len(surface.V), surface.edges, weights, forms)[1]
+    least = 1e-30
+    assert (_core.area.turn_areas(chart, turns) < least).sum() > 2000
+    spread, before = turns, None
+    while spread is not before:
+        before = spread
+        spread = spread_limbs(surface, chart, spread, forms, conformal.aspect, least)
+    areas = _core.area.turn_areas(chart, spread)
+    assert (areas > least).all() and abs(areas.sum() - 1.0) < 1e-9
+    stays = (spread == turns).all(axis=1)
+    assert 0 < stays.sum() < len(stays) - 1000
+    assert np.array_equal(unfolded_turns(surface, conformal), spread)
 
 
 def test_a_limb_beyond_the_reach_of_numbers_is_refused_with_the_remedy():
