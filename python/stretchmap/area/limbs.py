@@ -143,10 +143,10 @@ class _Limb:
         offsets = _summed(ends, forms[:, edges].T, len(vertices))
         return cls(vertices, number[surface.F[faces]], edge.reshape(-1, 3), ends, at_rim, offsets)
 
-    def outward(self) -> tuple[_Ints, _Ints, _Ints]:
-        """Rim edges as in their face: its row, first and second vertex."""
+    def rim(self) -> tuple[_Ints, _Ints, _Ints, _Ints]:
+        """Its edges as in their face: row, corner, first and second vertex."""
         face, corner = np.nonzero(self.at_rim[self.edge])
-        return face, self.F[face, corner], self.F[face, (corner + 1) % 3]
+        return face, corner, self.F[face, corner], self.F[face, (corner + 1) % 3]
 
     def areas(self, z: NDArray[np.complex128]) -> _Floats:
         """(p,) twice the signed areas of the faces over squared distances from zero."""
@@ -182,17 +182,19 @@ def _spread(
         return None
     shape = np.array([aspect, 1.0])
     at = (turns[limb.vertices] + limb.offsets) * shape
-    face, i, j = limb.outward()
+    face, corner, i, j = limb.rim()
     center = at[i].mean(axis=0)
     z = (at - center) @ np.array([1.0, 1.0j])
-    if not (np.angle(z[j] / z[i]) > 0.0).all() or (np.angle(z[j]) < np.angle(z[i])).sum() != 1:
+    jump = np.flatnonzero(np.angle(z[j]) < np.angle(z[i]))
+    if not (np.angle(z[j] * np.conj(z[i])) > 0.0).all() or len(jump) != 1:
         return None  # the rim does not run round the center
     tip = _tip(limb, surface.V[limb.vertices], i)
     ring = np.setdiff1d(limb.F[(limb.F == tip).any(axis=1)], tip)
     if np.isin(ring, i).any():
         return None
-    last = face[np.angle(z[j]) < np.angle(z[i])][0]
-    spread = _on_cylinder(limb, z, i, ring, tip, last)
+    last = int(face[jump[0]]), int(corner[jump[0]])
+    with np.errstate(all="ignore"):  # what is lost in rounding is counted in the end
+        spread = _on_cylinder(limb, z, i, ring, tip, last)
     if spread is None:
         return None
     flat = np.column_stack([spread.real, spread.imag]) + center
@@ -207,11 +209,17 @@ def _tip(limb: _Limb, V: _Floats, rim: _Ints) -> int:
 
 
 def _on_cylinder(
-    limb: _Limb, z: NDArray[np.complex128], rim: _Ints, ring: _Ints, tip: int, last: int
+    limb: _Limb,
+    z: NDArray[np.complex128],
+    rim: _Ints,
+    ring: _Ints,
+    tip: int,
+    last: tuple[int, int],
 ) -> NDArray[np.complex128] | None:
     """Places of the vertices round the tip at zero, as much shorter than conformal as folds none.
 
-    ``last`` is the face where the angle of the rim jumps.
+    ``last`` is the edge of the rim where its angle jumps, by face and corner; None if no vertex
+    lies between rim and ring.
     """
     n = len(limb.vertices)
     body = (limb.ends != tip).all(axis=1)
@@ -220,12 +228,14 @@ def _on_cylinder(
     graph = coo_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), (n, n)).tocsr()
     laplacian = (diags(np.asarray(graph.sum(axis=1)).ravel()) - graph).tocsr()
     inside = np.setdiff1d(np.arange(n), [*rim, tip])
+    between = np.setdiff1d(inside, ring)
+    if not len(between):
+        return None
     turned = np.bincount(i, jumps, n) - np.bincount(j, jumps, n)
     angle = np.angle(z)
     angle[inside] = splu(laplacian[inside][:, inside].tocsc()).solve(
         turned[inside] - laplacian[inside][:, rim] @ angle[rim]
     )
-    between = np.setdiff1d(inside, ring)
     factors = splu(laplacian[between][:, between].tocsc())
     drop = np.zeros(n)
     drop[ring] = 1.0
@@ -249,7 +259,7 @@ def _on_cylinder(
     return best
 
 
-def _jumps(limb: _Limb, tip: int, last: int) -> _Floats:
+def _jumps(limb: _Limb, tip: int, last: tuple[int, int]) -> _Floats:
     """(l,) by how much the angle round the tip grows along edges, beside its values at the ends."""
     order = np.argsort(limb.edge.ravel(), kind="stable")
     sides = limb.edge.ravel()[order]
@@ -258,13 +268,13 @@ def _jumps(limb: _Limb, tip: int, last: int) -> _Floats:
     graph = coo_matrix((np.ones(len(left)), (left, right)), (len(limb.F),) * 2)
     first = int(np.flatnonzero((limb.F == tip).any(axis=1))[0])
     before = breadth_first_order(graph.tocsr(), first, directed=False)[1]
-    path = [last]
+    path = [last[0]]
     while path[-1] != first:
         path.append(int(before[path[-1]]))
     inner, outer = np.array(path[:0:-1], np.intp), np.array(path[-2::-1], np.intp)
     shared = (limb.edge[inner][:, :, None] == limb.edge[outer][:, None, :]).any(axis=2)
-    face = np.append(inner, last)
-    corner = np.append(shared.argmax(axis=1), limb.at_rim[limb.edge[last]].argmax())
+    face = np.append(inner, last[0])
+    corner = np.append(shared.argmax(axis=1), last[1])
     edge = limb.edge[face, corner]
     jumps = np.zeros(len(limb.ends))
     np.add.at(jumps, edge, np.where(limb.ends[edge, 0] == limb.F[face, corner], TWO_PI, -TWO_PI))
