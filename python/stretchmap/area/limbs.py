@@ -76,31 +76,22 @@ def spread_limbs(
 
 
 def _limbs(surface: TriMesh, small: NDArray[np.bool_], lost: NDArray[np.bool_]) -> list[_Ints]:
-    """Faces of each limb: what the small ones cut off the rest, if any of it is lost."""
-    n, m, edge = len(surface.V), len(surface.F), surface.topology.edge.reshape(-1, 3)
-    core = _largest_part(edge, ~small, len(surface.edges))
-    limb = np.flatnonzero(~core)
-    rows = np.repeat(np.arange(len(limb)), 3)
-    links = (np.ones(len(rows)), (rows, len(limb) + surface.F[limb].ravel()))
-    size = len(limb) + n
-    label = connected_components(coo_matrix(links, (size, size)), directed=False)[1][: len(limb)]
-    if len(limb) == m:
+    """Faces of each limb: what the small ones cut off the largest of the rest, if any is lost."""
+    large = np.flatnonzero(~small)
+    if not len(large):
         return []
-    return [limb[label == part] for part in np.unique(label[lost[limb]])]
+    part = _parts(surface.topology.edge.reshape(-1, 3)[large], len(surface.edges))
+    limb = np.delete(np.arange(len(surface.F)), large[part == np.bincount(part).argmax()])
+    part = _parts(surface.F[limb], len(surface.V))
+    return [limb[part == each] for each in np.unique(part[lost[limb]])]
 
 
-def _largest_part(
-    edge: NDArray[np.int32], chosen: NDArray[np.bool_], n_edges: int
-) -> NDArray[np.bool_]:
-    """(m,) which of the chosen faces belong to the largest part of them, joined by edges."""
-    rows = np.flatnonzero(chosen)
-    owner = np.repeat(np.arange(len(rows)), 3)
-    links = (np.ones(len(owner)), (owner, len(rows) + edge[rows].ravel()))
-    size = len(rows) + n_edges
-    label = connected_components(coo_matrix(links, (size, size)), directed=False)[1][: len(rows)]
-    part = np.zeros(len(chosen), bool)
-    if len(rows):
-        part[rows[label == np.bincount(label).argmax()]] = True
+def _parts(shared: NDArray[np.int32], n: int) -> NDArray[np.int32]:
+    """(p,) number of the part each row is in; rows that name the same of n things are in one."""
+    rows = np.repeat(np.arange(len(shared)), 3)
+    links = (np.ones(len(rows)), (rows, len(shared) + shared.ravel()))
+    graph = coo_matrix(links, (len(shared) + n,) * 2)
+    part: NDArray[np.int32] = connected_components(graph, directed=False)[1][: len(shared)]
     return part
 
 

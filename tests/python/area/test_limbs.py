@@ -12,7 +12,7 @@ import pytest
 import stretchmap as sm
 from shapes import with_branch, with_limb
 from stretchmap import _core
-from stretchmap.area import finish
+from stretchmap.area import finish, limbs
 from stretchmap.area import map as area
 from stretchmap.area.flat import unfolded_turns
 from stretchmap.area.limbs import spread_limbs
@@ -77,6 +77,24 @@ def test_limbs_of_many_girths_are_spread(surface):
     stays = (spread == turns).all(axis=1)
     assert 0 < stays.sum() < len(stays) - 1000
     assert np.array_equal(unfolded_turns(surface, conformal), spread)
+
+
+def test_folds_are_mended_by_neighbors_and_all_else_stays():
+    surface = sm.samples.torus_surface(36, 18)
+    faces = np.flatnonzero((surface.V[surface.F][:, :, 0] > 2.2).all(axis=1))
+    disk = limbs._Limb.of(surface, faces, np.zeros((2, len(surface.edges))))
+    x, y, height = surface.V[disk.vertices].T
+    z = np.arctan2(y, x) + 1j * np.arctan2(height, np.hypot(x, y) - 2.0)
+    assert (disk.areas(z) > 0.0).all()
+    rim = disk.rim()[2]
+    moved = int(np.abs(z - 0.01).argmin())
+    folded = z.copy()
+    folded[moved] += 1.5 * np.abs(z[disk.F[(disk.F == moved).any(axis=1)]] - z[moved]).max()
+    assert (disk.areas(folded) < 0.0).any()
+    mended = limbs._unfolded(disk, folded, rim)
+    assert (disk.areas(mended) > 0.0).all()
+    assert np.array_equal(mended[rim], z[rim])
+    assert np.array_equal(limbs._unfolded(disk, z, rim), z)
 
 
 def test_a_limb_beyond_the_reach_of_numbers_is_refused_with_the_remedy():
