@@ -4,6 +4,7 @@
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/chart_newton.hpp"
 #include "stretchmap/area/coarsen.hpp"
+#include "stretchmap/area/edge_sags.hpp"
 #include "stretchmap/area/phase_energies.hpp"
 #include "stretchmap/area/surface_newton.hpp"
 #include "stretchmap/area/surface_reference.hpp"
@@ -24,6 +25,9 @@ void bind_chart(py::module_& m) {
       .def_readonly("shift_u", &SurfaceChart::shift_u)
       .def_readonly("shift_v", &SurfaceChart::shift_v);
   m.def("turn_areas", &turn_areas, py::arg("chart"), py::arg("turns").noconvert(), release_gil());
+  m.def("edge_sags", &edge_sags, py::arg("topology"), py::arg("chart"),
+        py::arg("areas").noconvert(), py::arg("angles").noconvert(), py::arg("ratio"),
+        release_gil());
   m.def("angle_from_equal_area", &angle_from_equal_area, py::arg("s"), py::arg("tube_ratio"),
         release_gil());
 }
@@ -122,6 +126,7 @@ void bind_glide(py::module_& m) {
       .def("measures", &SurfaceNewton::measures, release_gil())
       .def("least_facing", &SurfaceNewton::facing, release_gil())
       .def("flops", &SurfaceNewton::flops, release_gil())
+      .def_property_readonly("solves", &SurfaceNewton::solves)
       .def_property_readonly("angles", &SurfaceNewton::angles, py::return_value_policy::copy);
 }
 

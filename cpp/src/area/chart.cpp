@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "area/cross.hpp"
 #include "stretchmap/area/line_roots.hpp"
@@ -53,20 +54,26 @@ std::vector<Index> folded_faces(const SurfaceChart& chart, const Points2Ref& tur
   return faces;
 }
 
-double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,
-                     const Points2Ref& direction, double share, double longest) {
-  return least_of(static_cast<Index>(chart.faces.rows()), longest, [&](Index f) {
+Vec unfolded_steps(const SurfaceChart& chart, const Points2Ref& turns,
+                   const Points2Ref& direction) {
+  Vec steps(chart.faces.rows());
+  for_rows(static_cast<Index>(steps.size()), [&](Index f) {
     const Eigen::Vector2d p = chart.corner(turns, f, 0);
     const Eigen::Vector2d a = chart.corner(turns, f, 1) - p, b = chart.corner(turns, f, 2) - p;
     const auto way = [&](int k) -> Eigen::Vector2d {
       return (direction.row(chart.faces(f, k)) - direction.row(chart.faces(f, 0))).transpose();
     };
     const Eigen::Vector2d da = way(1), db = way(2);
-    const double now = cross(a, b);
-    if (!(now > 0.0)) return longest;
-    const double linear = cross(da, b) + cross(a, db), quadratic = cross(da, db);
-    return share * first_root(now, linear, quadratic);
+    const double now = cross(a, b), linear = cross(da, b) + cross(a, db);
+    steps(f) = now > 0.0 ? first_root(now, linear, cross(da, db))
+                         : std::numeric_limits<double>::infinity();
   });
+  return steps;
+}
+
+double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,
+                     const Points2Ref& direction, double share, double longest) {
+  return std::min(share * unfolded_steps(chart, turns, direction).minCoeff(), longest);
 }
 
 Vec equal_area_from_angle(const VecRef& v, double tube_ratio) {

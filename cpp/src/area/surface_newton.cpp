@@ -39,7 +39,9 @@ Points2 without_rotation(Points2 direction) {
 }  // namespace
 
 SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
-    : problem_(std::move(problem)), angles_(std::move(angles)) {
+    : problem_(std::move(problem)),
+      angles_(std::move(angles)),
+      damping_(Eigen::Vector2d(problem_.ratio, 1.0), kTwoPi) {
   const std::vector<Index> faces = folded_faces(problem_.chart, angles_ / kTwoPi);
   if (!faces.empty())
     throw Error("SolverError", "faces are flipped in the chart; Newton steps need a start without",
@@ -48,23 +50,26 @@ SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
 
 NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
   const double scale = best_scale(problem_, angles_);
-  const GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
+  GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
   rings_.reset();
-  const Vec flat = system().solve(here.hessians, here.gradient, poll);
-  const Points2 direction = without_rotation(as_rows(flat));
+  const auto solve = [&](const Rows& hessians) {
+    ++solves_;
+    return without_rotation(as_rows(system().solve(hessians, here.gradient, poll)));
+  };
+  const auto [direction, longest] = damping_.direction(
+      problem_.chart, angles_ / kTwoPi, problem_.reference.weights, here.hessians, solve);
 
-  const double slope = here.gradient.dot(flat);
+  const double slope = here.gradient.dot(Eigen::Map<const Vec>(direction.data(), direction.size()));
   NewtonStep result{here.value, here.value, 0.0, -slope};
   Points2 trial;
   double there = here.value;
-  result.step =
-      linalg::backtrack(here.value, slope, longest_step(direction), kGlideTries, [&](double t) {
-        if (poll) poll();
-        trial = angles_ + t * direction;
-        there = glide_energy(problem_, weights, scale, trial, Derivatives::kNone).value;
-        const bool sound = folded_faces(problem_.chart, trial / kTwoPi).empty();
-        return sound ? there : std::numeric_limits<double>::infinity();
-      });
+  result.step = linalg::backtrack(here.value, slope, longest, kGlideTries, [&](double t) {
+    if (poll) poll();
+    trial = angles_ + t * direction;
+    there = glide_energy(problem_, weights, scale, trial, Derivatives::kNone).value;
+    const bool sound = folded_faces(problem_.chart, trial / kTwoPi).empty();
+    return sound ? there : std::numeric_limits<double>::infinity();
+  });
   if (result.step > 0.0) {
     angles_ = std::move(trial);
     result.after = there;

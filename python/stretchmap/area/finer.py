@@ -44,7 +44,7 @@ _BENT = 0.5  # least share of its area that a face may keep when the flat chart 
 _PASSES = 14
 _MORE = 3  # times as many faces that look inward as before: halving edges does not help
 _APPROACH = 10, 10, 10  # most steps towards areas, edges that sag too much halved after each
-_HOPELESS = 0.5  # face SD after the first of them, from which on others lead no nearer
+_HOPELESS = 0.3  # face SD after the first of them, from which on others lead no nearer
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
@@ -55,6 +55,7 @@ _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
 _LONG, _FEW, _SLIVERS = 10.0, 0.01, 3.0  # slivers: a share of faces longer than that; their factor
+_CLOSE = 1.5  # times the face SD wanted: further steps lead there sooner than more faces do
 _GAIN, _IDLE = 0.9, 2  # rounds in a row that leave more of the error end them
 
 
@@ -135,26 +136,10 @@ class Finer:
         Of its two faces that where it is more. At the ends it does not sag: both long edges of a
         needle can lie deep below the torus and the needle be as thin as it is to be.
         """
-        surface, torus = self.level.surface, Torus(self.ratio, 1.0)
-        edge = surface.topology.edge.reshape(-1, 3)
-        i, j = surface.edges.T
-        image = self.image
-        ends = image[surface.edges]
-        change = self.angles[j] - self.angles[i] + TWO_PI * self.level.forms.T
-        over = torus.xi(*(self.angles[i] + 0.5 * change).T)
-        sag = np.linalg.norm(over - ends.mean(axis=1), axis=1)
-        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        wanted = surface.face_areas * (torus.area / surface.face_areas.sum())
-        found = np.zeros(len(surface.edges))
-        corners = image[surface.F]
-        along = np.roll(corners, -1, axis=1) - corners
-        across = np.roll(corners, -2, axis=1) - corners
-        foot = (across * along).sum(axis=2) / np.maximum(
-            (along**2).sum(axis=2), np.finfo(float).tiny
+        level = self.level
+        found: NDArray[np.float64] = _core.area.edge_sags(
+            level.surface.topology, level.chart, level.surface.face_areas, self.angles, self.ratio
         )
-        foot = np.clip(foot, 0.0, 1.0)
-        there = 4.0 * foot * (1.0 - foot)  # of the sag in the middle
-        np.maximum.at(found, edge, there * (sag * length)[edge] / (2.0 * wanted)[:, None])
         return found
 
     def halved(self, marked: NDArray[np.bool_]) -> Finer:
@@ -173,8 +158,10 @@ class Finer:
         finer = Level.of(done.surface, angles / TWO_PI, forms, level.aspect)
         return Finer(finer, angles, self.ratio, self.added.after(done))
 
-    def fitted(self, sag: float = _SAG) -> Finer | None:
+    def fitted(self, sag: float, share: float = 1.0) -> Finer | None:
         """With edges halved until none sags too much; None if that takes too many faces.
+
+        More than that share of those there may be.
 
         And until no face looks inward, if that does not: what lies in a chart without folds needs
         but edges short enough.
@@ -187,7 +174,7 @@ class Finer:
                 break
             # Halves of an edge sag a quarter as much over faces of the same height.
             pieces = np.ceil(np.sqrt(sags[marked] / sag))
-            if finer.too_many(int(pieces.sum()) - len(pieces)):
+            if finer.too_many(int(pieces.sum()) - len(pieces), share):
                 return None
             finer = finer.halved(marked)
         return finer.outward()
@@ -239,7 +226,7 @@ class Finer:
             history += records
             finer = replace(finer, angles=newton.angles)
             far = newton.measures().face_std > _HOPELESS
-            finer = finer.fitted() or finer.outward()
+            finer = finer.fitted(_SAG) or finer.outward()
             work.spend_on_fitting(finer.level.surface.n_faces)
             if far:
                 break
@@ -275,10 +262,10 @@ class Finer:
         """Faces of the input over those there are."""
         return 1.0 - self.added.n_added_faces / len(self.added.parent_face)
 
-    def too_many(self, more: int) -> bool:
-        """Whether so many vertices more would make more faces than may be."""
+    def too_many(self, more: int, share: float = 1.0) -> bool:
+        """Whether so many vertices more make more faces than may be, or than that share of them."""
         n_faces = len(self.added.parent_face)
-        return n_faces + 2 * more > _GROWTH * n_faces * self.share + _SPARE
+        return n_faces + 2 * more > share * (_GROWTH * n_faces * self.share + _SPARE)
 
 
 def mapped_finer(
@@ -307,20 +294,24 @@ def mapped_finer(
         history.extend(records)
         newton, n_faces = finer.newton(), finer.level.surface.n_faces
         if not newton.least_facing() > 0.0:
-            most = int(np.clip(_UNFOLDING[0] * work.steps(n_faces), *_UNFOLDING[1]))
-            unfolding = unfold_faces(newton, most, progress)
+            affordable = work.steps(n_faces)
+            most = min(int(np.clip(_UNFOLDING[0] * affordable, *_UNFOLDING[1])), affordable)
+            work.begin(newton, n_faces)
+            unfolding = unfold_faces(newton, most, progress, pace)
             work.spend(len(unfolding), n_faces)
             history.extend(unfolding)
             if not newton.least_facing() > 0.0:
                 return None
             finer = replace(finer, angles=newton.angles)
+        work.reserved = 0.0
         return finer, pace
 
     last, reason, pace = False, made.reason, Pace(_HEAVY)
     for round_ in range(_ROUNDS + 1):
         first = round_ == 0 and at_once
         # What the steps on a surface have made good wants no more vertices.
-        enough = not first and float(finer.ratios().std()) <= wanted
+        good = wanted * (_CLOSE if cut_short(reason) else 1.0)
+        enough = not first and float(finer.ratios().std()) <= good
         halved = finer if first else None if enough else finer.where_off(steps.tol)
         start = None if halved is None else begun(halved)
         if start is not None:

@@ -21,6 +21,7 @@ from .work import Work
 _SHAPE = 0.1
 _CHART = 1.0
 _FACING = 1.0
+_PUSH = 10.0  # weight of facing where areas are nearly right and are to stay so
 _GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
 _LIGHT = 4.0**3  # more of it from afar lets faces that are too coarse stand up from the torus
 _NEAR = 0.1  # face SD up to which steps may let faces look inward
@@ -94,14 +95,19 @@ def unfolded(
 
 
 def unfold_faces(
-    newton: _core.area.SurfaceNewton, steps: int, progress: Progress | None
+    newton: _core.area.SurfaceNewton,
+    steps: int,
+    progress: Progress | None,
+    pace: Pace | None = None,
 ) -> list[IterationRecord]:
     """Newton steps on the regularized energy until every face looks outward.
 
-    At most ``steps``, and no more where the number of those that do not hardly falls.
+    With a pace, areas are nearly right and the area term is as heavy as it says. At most ``steps``,
+    and no more where the number of those that do not hardly falls.
     """
     start = time.perf_counter()
     history: list[IterationRecord] = []
+    weight, push = (1.0, _FACING) if pace is None else (pace.weight, _PUSH)
     short = 0
     fewest: list[int] = []
     for iteration in range(steps):
@@ -109,7 +115,7 @@ def unfold_faces(
         if facing > 0.0:
             break
         epsilon = min(max(-_EPSILON * facing, _LEAST_EPSILON), _MOST_EPSILON)
-        taken = newton.step(_weights(1.0, _FACING, _SHAPE, epsilon))
+        taken = newton.step(_weights(weight, weight * push, _SHAPE, epsilon))
         history.append(_record("untangle", iteration + 1, taken, newton.measures(), start))
         report(progress, "area", iteration, steps, flips=history[-1].flips)
         short = short + 1 if taken.step < _SHORT else 0

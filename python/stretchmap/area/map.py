@@ -47,7 +47,11 @@ SHAPES = (1.0, 10.0, 100.0, 1e3)
 # The same where the surface is to become finer. Areas are less equal in such a chart, so edges are
 # halved for good only once they are nearly right: until then up to that sag is left.
 _EASED = (0.01, 0.1, 1.0)
-_COARSELY = 1.5
+_COARSELY = 3.0
+_RESERVED = (
+    0.25  # share of the work, for the surface as it is, until no face of a finer one is folded
+)
+_AT_ONCE = 0.6  # share of all faces that there may be, that this may take
 
 
 @takes_threads
@@ -239,7 +243,9 @@ def _finest(
     surface, finer = equal.level.surface, None
     wanted = goal(surface, route.steps.tol)
     if refine:
+        work.reserved = _RESERVED
         finer = _finer_at_once(route, equal, wanted, progress, torus, work)
+        work.reserved = 0.0
         if finer is not None and finer.certificate.certified:
             return finer
     found = _along(route, stack, equal, conformal, progress, torus, work)
@@ -286,7 +292,7 @@ def _finer_at_once(
         work.spend_in_chart(len(more))
         given = (route.phase, route.ratio)
         phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
-        finer = Finer.wrapped(level, turns, phase, ratio).fitted(_COARSELY)
+        finer = Finer.wrapped(level, turns, phase, ratio).fitted(_COARSELY, _AT_ONCE)
         work.spend_on_fitting((finer.level.surface if finer else level.surface).n_faces)
         if finer is not None:
             seconds = {"sem": time.perf_counter() - clock}

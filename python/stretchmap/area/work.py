@@ -19,8 +19,14 @@ _UNREFINED = 40  # steps where edges can be halved after them
 # Steps that others take as long as: one in the flat chart, one without a barrier against faces that
 # look inward, halving edges until few sag, and rings made exact.
 _CHART, _LOOSE, _FITTING, RINGS = 0.6, 0.9, 3, 8
+_ONCE = 0.8  # of what a face adds to a step, where its system is solved more than once
 _TOLD = 0.02  # of all the time; steps that took as long tell how long others will take
 _KEPT = 0.05  # of it, for the certificate
+
+
+def _whole(n_faces: int) -> float:
+    """Units that a surface of so many faces may take."""
+    return max(_EACH * n_faces, _LEAST)
 
 
 @dataclass
@@ -37,6 +43,8 @@ class Work:
     most : int
         Steps on a surface before edges are halved where they end short.
     clock : Budget
+    reserved : float
+        Share of all that is left for what follows should this lead nowhere.
     hurried : bool
         Whether time has allowed fewer steps than units did.
     """
@@ -45,16 +53,19 @@ class Work:
     left: float
     most: int
     clock: Budget = field(default_factory=lambda: Budget(math.inf))
+    reserved: float = 0.0
     hurried: bool = False
     _flops: float = _TYPICAL  # of the surfaces seen last
     _begun: float | None = None
+    _newton: _core.area.SurfaceNewton | None = None  # whose steps have begun
+    _solved: int = 0  # by it before
     _units: float = 0.0  # of which is known how long they took
     _seconds: float = 0.0
 
     @classmethod
     def of(cls, surface: TriMesh, clock: Budget, *, refine: bool) -> Work:
         """All of it."""
-        left = max(_EACH * surface.n_faces, _LEAST)
+        left = _whole(surface.n_faces)
         work = cls(surface.n_faces, left, _UNREFINED, clock)
         if not refine:
             work.most = work.steps()
@@ -63,14 +74,20 @@ class Work:
     def begin(self, newton: _core.area.SurfaceNewton, n_faces: int) -> None:
         """Steps, of which the next `spend` tells how many they were.
 
-        What its elimination takes, which separators tell, holds for finer surfaces, too.
+        Where it is solved more than once in a step, that counts. What its elimination takes, which
+        separators tell, holds for finer surfaces, too.
         """
-        self._begun = time.process_time()
+        self._begun, self._newton, self._solved = time.process_time(), newton, newton.solves
         self._flops = newton.flops() / n_faces**1.5
 
-    def spend(self, steps: float, n_faces: int | None = None) -> None:
-        """Newton steps on a surface of so many faces."""
-        units = steps * self._cost(n_faces or self.n_faces)
+    def spend(self, steps: int, n_faces: int | None = None, each: float = 1.0) -> None:
+        """Newton steps on a surface of so many faces, each of which takes as long as so many."""
+        n_faces = n_faces or self.n_faces
+        cost = self._cost(n_faces)
+        units = each * steps * cost
+        if self._newton is not None:
+            units += max(self._newton.solves - self._solved - steps, 0) * (cost - _ONCE * n_faces)
+            self._newton = None
         self.left -= units
         if self._begun is not None:
             self._units += units
@@ -79,11 +96,11 @@ class Work:
 
     def spend_in_chart(self, steps: int) -> None:
         """Newton steps in the flat chart."""
-        self.spend(_CHART * steps)
+        self.spend(steps, each=_CHART)
 
     def spend_on_approach(self, steps: int, n_faces: int) -> None:
         """Newton steps on a surface of so many faces, whichever way these look."""
-        self.spend(_LOOSE * steps, n_faces)
+        self.spend(steps, n_faces, _LOOSE)
 
     def spend_on_fitting(self, n_faces: int) -> None:
         """Edges halved until none sags too much, which has led to so many faces."""
@@ -99,7 +116,8 @@ class Work:
         At least so many, if there is time for them, and at most so many.
         """
         cost = self._cost(n_faces or self.n_faces)
-        units, in_time = min(max(self.left, least * cost), most * cost), self._in_time()
+        left = self.left - self.reserved * _whole(self.n_faces)
+        units, in_time = min(max(left, least * cost), most * cost), self._in_time()
         self.hurried = self.hurried or in_time < units
         return max(int(min(units, in_time) / cost + 1e-9), 0)
 
@@ -111,5 +129,5 @@ class Work:
         """Units there is time for, at the rate of the steps so far."""
         if self._seconds < _TOLD * self.clock.seconds or self._units == 0.0:
             return math.inf
-        left = max(self.clock.left - _KEPT * self.clock.seconds, 0.0)
+        left = max(self.clock.left - (_KEPT + self.reserved) * self.clock.seconds, 0.0)
         return left * self._units / self._seconds

@@ -42,6 +42,10 @@ Vec turn_areas(const SurfaceChart& chart, const Points2Ref& turns);
 std::vector<Index> folded_faces(const SurfaceChart& chart, const Points2Ref& turns);
 
 // \param direction (n, 2) of the step.
+// \return (m) how far each face with positive area keeps it, infinity for others and where always.
+Vec unfolded_steps(const SurfaceChart& chart, const Points2Ref& turns, const Points2Ref& direction);
+
+// \param direction (n, 2) of the step.
 // \return how far no face with positive area loses it: `share` of the way to the first one, at most
 //         `longest`.
 double unfolded_step(const SurfaceChart& chart, const Points2Ref& turns,

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "stretchmap/area/chart_system.hpp"
+#include "stretchmap/area/face_damping.hpp"
 #include "stretchmap/area/surface_energy.hpp"
 #include "stretchmap/area/surface_rings.hpp"
 #include "stretchmap/area/surface_sem.hpp"
@@ -37,8 +38,10 @@ class SurfaceNewton {
   // As least_facing.
   double facing() const { return least_facing(problem_, angles_); }
 
-  // Of the elimination in a step.
+  // Of the elimination in a step that needs one.
   double flops();
+  // So far: more than steps where faces had to be damped.
+  int solves() const { return solves_; }
 
   const Points2& angles() const { return angles_; }
   const GlideProblem& problem() const { return problem_; }
@@ -49,6 +52,8 @@ class SurfaceNewton {
 
   GlideProblem problem_;
   Points2 angles_;
+  FaceDamping damping_;
+  int solves_ = 0;
   std::optional<ChartSystem> system_;  // of these two one at a time
   std::optional<RingSystem> rings_;
 };
