@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.budget import Budget
 from ..base.progress import Progress, report
 from ..maps.history import IterationRecord
 from .coarse import Level
 
 # Excess of E_S over its bound, the variance of the ratios, up to which (4.5) has done its work.
 JAMMED = 1e-2
-_STEPS = 250
+STEPS = 250
 _SHAPE = 0.1  # weight of the shape term, that of the area term being one
 _GROWTH, _MOST_WEIGHT = 4.0, 64.0  # of the area term against it
 _REACH, _MOST_REACH = 4.0, 1e6  # factors of area asked for in one step
@@ -30,12 +31,16 @@ _SETTLED = 0.02  # share of the energy; a step that lowers it by less was the la
 
 
 def balance_areas(
-    level: Level, shape: float, progress: Progress | None, most: int = _STEPS
+    level: Level,
+    shape: float,
+    progress: Progress | None,
+    most: int = STEPS,
+    clock: Budget | None = None,
 ) -> tuple[NDArray[np.float64], list[IterationRecord]]:
     """Turns (n, 2) with nearly equal area ratios, from the level's; records.
 
     Unless `shape` is zero, the weight of the shape term stays at it, and areas are left as far from
-    equal as that makes them. At most ``most`` steps.
+    equal as that makes them. At most ``most`` steps, and none once a clock's time is spent.
     """
     start = time.perf_counter()
     newton = _core.area.ChartNewton(level.chart, level.reference, level.aspect, level.turns)
@@ -43,6 +48,8 @@ def balance_areas(
     lightest = shape or _SHAPE / _MOST_WEIGHT
     shape, reach = shape or _SHAPE, _REACH
     for iteration in range(1, most + 1):
+        if clock is not None and clock.spent:
+            break
         taken = newton.step(1.0, shape, reach)
         measured = newton.measures()
         history.append(

@@ -23,6 +23,7 @@ from ..mesh.halved_faces import SurfaceRefinement, halve_edges
 from ..mesh.surfaces import TriMesh
 from .coarse import Level, forms_of
 from .finish import (
+    MANY_FOLDED,
     Pace,
     Steps,
     approach_areas,
@@ -44,12 +45,13 @@ _BENT = 0.5  # least share of its area that a face may keep when the flat chart 
 _PASSES = 14
 _MORE = 3  # times as many faces that look inward as before: halving edges does not help
 _APPROACH = 10, 10, 10  # most steps towards areas, edges that sag too much halved after each
-_HOPELESS = 0.3  # face SD after the first of them, from which on others lead no nearer
+# Face SD after the first of them from which on others lead no nearer, and nothing does.
+_HOPELESS, _LOST = 0.3, 0.5
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
 _LEAST_STEPS = 10  # from where areas are nearly right, however little work is left
-_STEPS = 20  # of each round; fewer are not worth it
+ROUND_STEPS = 20  # of each round; fewer are not worth it
 _UNFOLDING = (0.6, (10, 60))  # a share of the work, and steps, until no face is folded
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
@@ -219,7 +221,9 @@ class Finer:
         for most in _APPROACH:
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
             work.begin(newton, n_faces)
-            affordable = max(work.steps(n_faces) - _LEAST_STEPS, 0)
+            affordable = work.steps(n_faces) - _LEAST_STEPS
+            if affordable <= 0:
+                break
             records, reached = approach_areas(newton, min(most, affordable), progress)
             pace = max(pace, reached, key=lambda each: each.weight)
             work.spend_on_approach(len(records), n_faces)
@@ -288,23 +292,35 @@ def mapped_finer(
 
     def begun(finer: Finer) -> tuple[Finer, Pace] | None:
         """From where steps go on, if some can be afforded and lead to no folded face."""
-        if work.steps(finer.level.surface.n_faces) < _STEPS:
+        if work.steps(finer.level.surface.n_faces) < ROUND_STEPS:
             return None
         finer, pace, records = finer.approached(progress, work)
         history.extend(records)
-        newton, n_faces = finer.newton(), finer.level.surface.n_faces
-        if not newton.least_facing() > 0.0:
-            affordable = work.steps(n_faces)
-            most = min(int(np.clip(_UNFOLDING[0] * affordable, *_UNFOLDING[1])), affordable)
-            work.begin(newton, n_faces)
-            unfolding = unfold_faces(newton, most, progress, pace)
-            work.spend(len(unfolding), n_faces)
-            history.extend(unfolding)
-            if not newton.least_facing() > 0.0:
+        if records and records[-1].element_std > _LOST:
+            return None
+        newton, n_faces, reserved = finer.newton(), finer.level.surface.n_faces, work.reserved
+        if not turned_outward(newton, n_faces, pace):
+            # On the last few of them, what is reserved is well spent.
+            if not reserved or newton.measures().flips > MANY_FOLDED:
                 return None
-            finer = replace(finer, angles=newton.angles)
+            work.reserved = 0.0
+            if not turned_outward(newton, n_faces, pace):
+                work.reserved = reserved
+                return None
         work.reserved = 0.0
-        return finer, pace
+        return replace(finer, angles=newton.angles), pace
+
+    def turned_outward(newton: _core.area.SurfaceNewton, n_faces: int, pace: Pace) -> bool:
+        """Whether every face looks outward, some steps later if need be."""
+        if newton.least_facing() > 0.0:
+            return True
+        affordable = work.steps(n_faces)
+        most = min(int(np.clip(_UNFOLDING[0] * affordable, *_UNFOLDING[1])), affordable)
+        work.begin(newton, n_faces)
+        unfolding = unfold_faces(newton, most, progress, pace)
+        work.spend(len(unfolding), n_faces)
+        history.extend(unfolding)
+        return newton.least_facing() > 0.0
 
     last, reason, pace = False, made.reason, Pace(_HEAVY)
     for round_ in range(_ROUNDS + 1):
@@ -325,10 +341,15 @@ def mapped_finer(
         affordable = work.steps(n_faces)
         with_rings = rings and affordable >= _LEAST_STEPS + RINGS
         most = affordable - RINGS if with_rings else work.steps(n_faces, least=_LEAST_STEPS)
-        most = min(most if last else min(most, _STEPS), steps.max_iter)
+        most = min(most if last else min(most, ROUND_STEPS), steps.max_iter)
         work.begin(newton, n_faces)
         records, converged, reason = finish_areas(
-            newton, with_rings, Steps(most, steps.tol, steps.shape_budget), progress, pace
+            newton,
+            with_rings,
+            Steps(most, steps.tol, steps.shape_budget),
+            progress,
+            pace,
+            work.late,
         )
         work.spend(len(records), n_faces)
         history += records

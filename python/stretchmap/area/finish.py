@@ -45,6 +45,9 @@ _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing 
 # In so many steps the fewest faces folded so far are to become fewer by that factor: what is mostly
 # folded or folds ever more faces is not unfolded by any number of steps.
 _WINDOW, _FEWER = 10, 0.7
+MANY_FOLDED = (
+    30  # in half as many steps, where areas are nearly right and more than that are folded
+)
 _EPSILON = 0.2  # of the worst face
 _LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
 
@@ -120,7 +123,8 @@ def unfold_faces(
         report(progress, "area", iteration, steps, flips=history[-1].flips)
         short = short + 1 if taken.step < _SHORT else 0
         fewest.append(min([*fewest[-1:], history[-1].flips]))
-        slow = len(fewest) > _WINDOW and fewest[-1] > _FEWER * fewest[-1 - _WINDOW]
+        window = _WINDOW if pace is None or fewest[-1] <= MANY_FOLDED else _WINDOW // 2
+        slow = len(fewest) > window and fewest[-1] > _FEWER * fewest[-1 - window]
         if taken.step == 0.0 or short == _JAMMED or slow:
             break
     return history
@@ -179,10 +183,12 @@ def finish_areas(
     steps: Steps,
     progress: Progress | None,
     pace: Pace | None = None,
+    late: Callable[[], bool] | None = None,
 ) -> tuple[list[IterationRecord], bool, str]:
     """Newton steps on the polyhedral areas: records, converged, reason; `pace` is moved on.
 
-    Faces that look outward stay so; if some do not, that barrier is left out.
+    Faces that look outward stay so; if some do not, that barrier is left out. None follows once
+    `late` says so.
     """
     start = time.perf_counter()
     history: list[IterationRecord] = []
@@ -197,6 +203,8 @@ def finish_areas(
     reason = _MOST_DONE
     for iteration in range(steps.max_iter + 1):
         if iteration:
+            if late is not None and late():
+                break
             taken = newton.step(_weights(weight, barrier, shape))
             if taken.step >= _FULL_STEP:
                 weight = min(weight * _GROWTH, heaviest)

@@ -25,11 +25,11 @@ from ..maps.history import IterationRecord
 from ..mesh.given import as_surface, require_same_mesh
 from ..mesh.halved_faces import SurfaceRefinement
 from .coarse import Level, levels
-from .finer import Finer, goal, mapped_finer
+from .finer import ROUND_STEPS, Finer, goal, mapped_finer
 from .finish import Steps, cut_short, finish_areas, unfolded
 from .flat import unfolded_turns
 from .result import AreaMap
-from .route import EqualAreas, Finish, Made, Route, best_turns, follow
+from .route import EASING, EqualAreas, Finish, Made, Route, best_turns, follow
 from .search import Ratio, search_phase
 from .work import Work
 
@@ -215,7 +215,7 @@ def _found(
     budget: Budget,
 ) -> AreaMap:
     """The map a route leads to, on a finer surface where it takes one, certified or not."""
-    equal = equal_areas(surface, conformal, progress)
+    equal = equal_areas(surface, conformal, progress, budget)
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
     stack = levels(equal.level)
@@ -240,15 +240,15 @@ def _finest(
     work: Work,
 ) -> AreaMap:
     """The same, of a surface as fine as there is work for."""
-    surface, finer = equal.level.surface, None
+    surface, finer, coarse = equal.level.surface, None, False
     wanted = goal(surface, route.steps.tol)
     if refine:
         work.reserved = _RESERVED
-        finer = _finer_at_once(route, equal, wanted, progress, torus, work)
+        coarse, finer = _finer_at_once(route, equal, wanted, progress, torus, work)
         work.reserved = 0.0
         if finer is not None and finer.certificate.certified:
             return finer
-    found = _along(route, stack, equal, conformal, progress, torus, work)
+    found = _along(route, stack, equal, conformal, progress, torus, work, alone=not coarse)
     unfinished = not _good(found, wanted) or cut_short(found.stop_reason)
     if finer is None and refine and unfinished and not _folded(found):
         level = Level.of(surface, found.angles / TWO_PI, conformal.forms, conformal.aspect)
@@ -272,8 +272,8 @@ def _finer_at_once(
     progress: Progress | None,
     torus: Torus | None,
     work: Work,
-) -> AreaMap | None:
-    """The map of a finer surface, if this one is too coarse for its place in the chart.
+) -> tuple[bool, AreaMap | None]:
+    """Whether this surface is too coarse for its place in the chart; if so, the map of a finer one.
 
     From a chart eased towards shapes: in one where areas alone count, faces can be needles by the
     thousand. Where that takes too many faces or leaves some folded, from charts eased further.
@@ -283,10 +283,10 @@ def _finer_at_once(
     turns, (phase, ratio, _), records = best_turns(route, equal)
     work.spend_in_chart(sum(record.stage == "balance" for record in records))
     if not Finer.wrapped(level, turns, phase, ratio).too_coarse():
-        return None
+        return False, None
     for shape in _EASED:
-        if work.clock.spent:
-            return None
+        if work.steps() < ROUND_STEPS:
+            return True, None
         turns, more = equal.eased(shape, turns)
         records = records + more
         work.spend_in_chart(len(more))
@@ -299,8 +299,8 @@ def _finer_at_once(
             made = Made(finer.angles, phase, ratio, records, seconds=seconds)
             found = _finer(route, finer, made, wanted, progress, torus, work)
             if found is not None:
-                return found
-    return None
+                return True, found
+    return True, None
 
 
 def _finer(
@@ -333,40 +333,58 @@ def _along(
     progress: Progress | None,
     torus: Torus | None,
     work: Work,
+    *,
+    alone: bool,
 ) -> AreaMap:
-    """The map a route leads to, certified or not; by rising weights of shape while it is folded."""
+    """The map a route leads to, certified or not; by rising weights of shape while it is folded.
+
+    Unless areas ``alone`` are worth a try, with some weight of shape at once.
+    """
     finest = equal.level
     surface, forms = finest.surface, conformal.forms
-    made = follow(route, stack, progress, equal if len(stack) == 1 else None, work)
-    found = _result(surface, forms, made, torus)
-    for shape in SHAPES:
-        if found.certificate.certified or not _folded(found) or work.clock.spent:
-            return found
-        _log.info("%s: once more with weight %g of shape", found.certificate.reason, shape)
-        along = dataclasses.replace(route, shape=shape)
+    found = None
+    for shape in (0.0, *SHAPES) if alone else SHAPES:
+        along, way = dataclasses.replace(route, shape=shape), stack
+        if shape > 0.0:
+            if found is not None:
+                if found.certificate.certified or not _folded(found) or work.clock.spent:
+                    return found
+                _log.info("%s: with weight %g of shape", found.certificate.reason, shape)
+            equal.shaped(shape, EASING)
+            way = [finest]
         try:
-            made = follow(along, [finest], progress, equal, work)
+            made = follow(along, way, progress, equal if len(way) == 1 else None, work)
         except SolverError as error:  # sizes of faces are lost in rounding; what there is, stands
+            if found is None:
+                raise
             _log.info("%s", error)
             continue
-        made.reason = f"faces folded where areas alone counted; {made.reason}"
+        if shape > 0.0:
+            made.reason = f"faces folded where areas alone counted; {made.reason}"
         other = _result(surface, forms, made, torus)
-        if other.certificate.certified or _folded(other) < _folded(found):
+        if found is None or other.certificate.certified or _folded(other) < _folded(found):
             found = other
+    assert found is not None
     if found.certificate.certified or not _folded(found):
         return found
     clock = time.perf_counter()
     newton = finest.newton(found.angles, found.ratio)
     limited = dataclasses.replace(route.steps, max_iter=min(route.steps.max_iter, work.steps()))
-    records, _, reason = finish_areas(newton, False, limited, progress)
+    records, _, reason = finish_areas(newton, False, limited, progress, late=work.late)
     found = _moved(found, newton.angles, records, clock)
     return dataclasses.replace(found, converged=False, stop_reason=reason)
 
 
-def equal_areas(surface: TriMesh, conformal: ConformalMap, progress: Progress | None) -> EqualAreas:
+def equal_areas(
+    surface: TriMesh,
+    conformal: ConformalMap,
+    progress: Progress | None,
+    clock: Budget | None = None,
+) -> EqualAreas:
     """The flat chart of a surface, areas yet to be made equal."""
     turns = unfolded_turns(surface, conformal)
-    return EqualAreas(Level.of(surface, turns, conformal.forms, conformal.aspect), progress)
+    level = Level.of(surface, turns, conformal.forms, conformal.aspect)
+    return EqualAreas(level, progress, clock)
 
 
 def charted(

@@ -11,9 +11,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.budget import Budget
 from ..base.progress import Progress
 from ..maps.history import IterationRecord
-from .balance import JAMMED, balance_areas
+from .balance import JAMMED, STEPS, balance_areas
 from .coarse import Folded, Level
 from .finish import FEW_UNFOLD_STEPS, Pace, Steps, finish_areas, unfolded
 from .flat import start_angles
@@ -24,7 +25,7 @@ from .work import Work
 _log = logging.getLogger("stretchmap")
 
 _LEAST_STEPS = 20  # areas get, however little work is left
-_EASING = 25  # steps towards shapes from where areas are equal
+EASING = 25  # steps towards shapes from where areas are equal
 
 Finish = Literal["ring", "face", "none"]
 _Turns = tuple[NDArray[np.float64], list[IterationRecord]]
@@ -67,11 +68,16 @@ class EqualAreas:
     ----------
     level : Level
     progress : Progress or None
+    clock : Budget, optional
+        Steps end when its time is spent.
     """
 
-    def __init__(self, level: Level, progress: Progress | None) -> None:
+    def __init__(
+        self, level: Level, progress: Progress | None, clock: Budget | None = None
+    ) -> None:
         self.level = level
         self._progress = progress
+        self._clock = clock
         self._stretched: dict[int, _Turns] = {}
         self._balanced: dict[float, _Turns] = {}
 
@@ -84,25 +90,28 @@ class EqualAreas:
     def balanced(self, shape: float) -> _Turns:
         """By Newton steps, with that weight of shape; with records."""
         if shape not in self._balanced:
-            self._balanced[shape] = balance_areas(self.level, shape, self._progress)
+            self._balanced[shape] = self._balance(self.level, shape)
         return self._balanced[shape]
 
-    def shaped(self, shape: float) -> None:
+    def shaped(self, shape: float, most: int = STEPS) -> None:
         """Make those with that weight of shape, if nearly equal areas have been made before.
 
         From there it is half the way to the same minimum, where a conformal map is far from both.
         """
         if 0.0 in self._balanced and shape not in self._balanced:
             level = dataclasses.replace(self.level, turns=self._balanced[0.0][0])
-            self._balanced[shape] = balance_areas(level, shape, self._progress)
+            self._balanced[shape] = self._balance(level, shape, most)
 
     def eased(self, shape: float, turns: NDArray[np.float64]) -> _Turns:
         """Others moved on by Newton steps with that weight of shape; with records."""
         level = dataclasses.replace(self.level, turns=turns)
-        found = balance_areas(level, shape, self._progress, most=_EASING)
+        found = self._balance(level, shape, EASING)
         # As good a chart as any with that weight, and there already.
         self._balanced.setdefault(shape, found)
         return found
+
+    def _balance(self, level: Level, shape: float, most: int = STEPS) -> _Turns:
+        return balance_areas(level, shape, self._progress, most, self._clock)
 
 
 def follow(
@@ -117,11 +126,13 @@ def follow(
     ``equal`` is that of the last level, if there is one already. What stays folded is not finished.
     """
     try:
-        return _climb(route, stack, equal or EqualAreas(stack[-1], progress), progress, work)
+        return _climb(
+            route, stack, equal or EqualAreas(stack[-1], progress, work.clock), progress, work
+        )
     except Folded:
         _log.info("a coarser surface's map folds faces of this one: mapped without it")
         finest = dataclasses.replace(stack[0], coarse=None)
-        return _climb(route, [finest], EqualAreas(finest, progress), progress, work)
+        return _climb(route, [finest], EqualAreas(finest, progress, work.clock), progress, work)
 
 
 def _climb(
@@ -161,7 +172,7 @@ def _climb(
             steps = dataclasses.replace(steps, max_iter=min(steps.max_iter, affordable))
             work.begin(newton, work.n_faces)
         records, made.converged, made.reason = finish_areas(
-            newton, finest and route.finish == "ring", steps, progress, pace
+            newton, finest and route.finish == "ring", steps, progress, pace, work.late
         )
         made.add(records, finest)
         made.angles = newton.angles

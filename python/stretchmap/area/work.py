@@ -121,6 +121,12 @@ class Work:
         self.hurried = self.hurried or in_time < units
         return max(int(min(units, in_time) / cost + 1e-9), 0)
 
+    def late(self) -> bool:
+        """Whether what time is left is for the certificate."""
+        late = self.clock.left < _KEPT * self.clock.seconds
+        self.hurried = self.hurried or late
+        return late
+
     def _cost(self, n_faces: int) -> float:
         """Of a step."""
         return n_faces * (1.0 + self._flops * math.sqrt(n_faces) / _FLOPS)

@@ -307,7 +307,7 @@ def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> 
         return where_off(self, tol) if len(asked) == 1 else None
 
     monkeypatch.setattr(Finer, "where_off", once)
-    monkeypatch.setattr(finer, "_STEPS", 3)
+    monkeypatch.setattr(finer, "ROUND_STEPS", 3)
     made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
     n_faces = start.level.surface.n_faces
     work = Work(n_faces, 200.0 * n_faces, 40)
