@@ -13,7 +13,7 @@ from stretchmap import TriMesh, _core
 from stretchmap.area import finer
 from stretchmap.area.coarse import Level
 from stretchmap.area.finer import Finer, goal, mapped_finer
-from stretchmap.area.finish import Steps, approach_areas, unfold_faces
+from stretchmap.area.finish import Pace, Steps, approach_areas, finish_areas, unfold_faces
 from stretchmap.area.map import equal_areas
 from stretchmap.area.route import Made
 from stretchmap.area.search import search_phase
@@ -214,6 +214,42 @@ def test_work_is_left_for_the_surface_as_it_is() -> None:
     assert work.steps() == 0
     work.reserved = 0.0
     assert work.steps() >= most // 4
+
+
+def test_steps_end_when_it_is_late() -> None:
+    surface = sm.samples.bumpy_torus(1000).surface
+    start = start_of(surface)
+    for late, most in ((lambda: True, 1), (lambda: False, 6)):
+        steps = Steps(5, 1e-12, np.inf)
+        records, _, reason = finish_areas(start.newton(), False, steps, None, None, late)
+        assert len(records) == most and "most steps done" in reason
+    work = Work.of(surface, Budget(10.0), refine=True)
+    assert not work.late() and not work.hurried
+    work.clock = Budget(0.0)
+    assert Work.of(surface, Budget(np.inf), refine=True).late() is False
+    equal = equal_areas(surface, sm.conformal_map(surface), None, Budget(0.0))
+    assert len(equal.balanced(0.0)[1]) == 0
+
+
+def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
+    rough = start_of(small_handle(1, 3.8))
+    start = rough.halved(np.arange(len(rough.sags())) == 0)
+    assert inward_faces(start) > 0
+    monkeypatch.setattr(Finer, "approached", lambda self, *_: (self, Pace(), []))
+    taken = []
+
+    def unfold(newton, steps, progress, pace):
+        taken.append(steps)
+        return []
+
+    monkeypatch.setattr(finer, "unfold_faces", unfold)
+    made = Made(start.angles, 0.0, start.ratio, [])
+    for many, times in ((0, 1), (10**6, 2)):
+        taken.clear()
+        monkeypatch.setattr(finer, "MANY_FOLDED", many)
+        work = Work(start.level.surface.n_faces, 1e9, 40, reserved=0.25)
+        assert mapped_finer(start, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work) is None
+        assert len(taken) == times and work.reserved == 0.25
 
 
 def test_solves_beyond_one_a_step_are_counted() -> None:

@@ -270,9 +270,9 @@ def test_equal_areas_are_made_once_for_each_weight_of_shape(monkeypatch):
     made = boundary_starts_module._BoundaryMaps(SOLID.surface, VolumeOptions(), None)
     weights = []
 
-    def balanced(level, shape, progress):
+    def balanced(level, shape, *others):
         weights.append(shape)
-        return balance_areas(level, shape, progress)
+        return balance_areas(level, shape, *others)
 
     monkeypatch.setattr(route, "balance_areas", balanced)
     charts = [made._chart(ratio, shape) for shape in (100.0, 1e3) for ratio in (2.0, 3.0)]
