@@ -229,10 +229,12 @@ class Finer:
             work.spend_on_approach(len(records), n_faces)
             history += records
             finer = replace(finer, angles=newton.angles)
-            far = newton.measures().face_std > _HOPELESS
+            error = newton.measures().face_std
+            if error > _LOST:
+                break
             finer = finer.fitted(_SAG) or finer.outward()
             work.spend_on_fitting(finer.level.surface.n_faces)
-            if far:
+            if error > _HOPELESS:
                 break
         return finer, pace, history
 

@@ -45,9 +45,8 @@ _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing 
 # In so many steps the fewest faces folded so far are to become fewer by that factor: what is mostly
 # folded or folds ever more faces is not unfolded by any number of steps.
 _WINDOW, _FEWER = 10, 0.7
-MANY_FOLDED = (
-    30  # in half as many steps, where areas are nearly right and more than that are folded
-)
+# In half as many where areas are nearly right, so many are folded and the energy hardly falls.
+MANY_FOLDED, _FALLING = 30, 0.1
 _EPSILON = 0.2  # of the worst face
 _LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
 
@@ -123,7 +122,9 @@ def unfold_faces(
         report(progress, "area", iteration, steps, flips=history[-1].flips)
         short = short + 1 if taken.step < _SHORT else 0
         fewest.append(min([*fewest[-1:], history[-1].flips]))
-        window = _WINDOW if pace is None or fewest[-1] <= MANY_FOLDED else _WINDOW // 2
+        hasty = pace is not None and fewest[-1] > MANY_FOLDED
+        hasty = hasty and taken.before - taken.after < _FALLING * abs(taken.before)
+        window = _WINDOW // 2 if hasty else _WINDOW
         slow = len(fewest) > window and fewest[-1] > _FEWER * fewest[-1 - window]
         if taken.step == 0.0 or short == _JAMMED or slow:
             break
