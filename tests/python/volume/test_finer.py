@@ -47,7 +47,7 @@ def test_tets_that_keep_volumes_badly_get_vertices(solid, finer, monkeypatch):
     assert coarse.converged and finer.converged and finer.certificate.certified
     assert unevenness(finer, solid) < 0.9 * unevenness(coarse, solid)
     mean = [np.abs(one.distortion.ratios - 1.0).mean() for one in (coarse, finer)]
-    assert mean[0] > engine._UNEVEN and mean[1] < 0.95 * mean[0]
+    assert mean[0] > engine._UNEVEN and mean[1] < 0.97 * mean[0]
     assert finer.mesh.n_tets < 1.25 * coarse.mesh.n_tets
     np.testing.assert_array_equal(finer.mesh.V[: solid.n_vertices], solid.V)
     np.testing.assert_array_equal(finer.mesh.boundary_vertices, solid.boundary_vertices)
