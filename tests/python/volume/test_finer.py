@@ -40,17 +40,26 @@ def unevenness(result: sm.VolumeMap, solid: sm.TetMesh) -> float:
     return float(np.abs(ratios / (volumes.sum() / solid.volume) - 1.0).mean())
 
 
-def test_tets_that_keep_volumes_badly_get_vertices(solid, finer, monkeypatch):
+def mean_error(result: sm.VolumeMap) -> float:
+    return float(np.abs(result.distortion.ratios - 1.0).mean())
+
+
+def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
+    """Of one plate the mean may gain a fifth or nearly nothing, of four together a tenth."""
+    solids = [plate(n, 3, 3) for n in (9, 10, 11, 12)]
+    finer = [sm.volume_map(solid) for solid in solids]
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
-    coarse = sm.volume_map(solid)
-    assert not coarse.refinement.halved and finer.refinement.halved
-    assert coarse.converged and finer.converged and finer.certificate.certified
-    assert unevenness(finer, solid) < 0.9 * unevenness(coarse, solid)
-    mean = [np.abs(one.distortion.ratios - 1.0).mean() for one in (coarse, finer)]
-    assert mean[0] > engine._UNEVEN and mean[1] < 0.97 * mean[0]
-    assert finer.mesh.n_tets < 1.25 * coarse.mesh.n_tets
-    np.testing.assert_array_equal(finer.mesh.V[: solid.n_vertices], solid.V)
-    np.testing.assert_array_equal(finer.mesh.boundary_vertices, solid.boundary_vertices)
+    coarse = [sm.volume_map(solid) for solid in solids]
+    for solid, before, after in zip(solids, coarse, finer, strict=True):
+        assert not before.refinement.halved and after.refinement.halved
+        assert before.converged and after.converged and after.certificate.certified
+        assert unevenness(after, solid) < 0.9 * unevenness(before, solid)
+        assert mean_error(before) > engine._UNEVEN and mean_error(after) < mean_error(before)
+        np.testing.assert_array_equal(after.mesh.V[: solid.n_vertices], solid.V)
+        np.testing.assert_array_equal(after.mesh.boundary_vertices, solid.boundary_vertices)
+    assert sum(map(mean_error, finer)) < 0.9 * sum(map(mean_error, coarse))
+    n_finer, n_coarse = (sum(each.mesh.n_tets for each in maps) for maps in (finer, coarse))
+    assert n_finer < 1.25 * n_coarse
 
 
 def test_what_keeps_volumes_well_is_left_as_it_is(solid, monkeypatch):
@@ -63,7 +72,7 @@ def test_no_vertices_where_a_held_boundary_keeps_volumes_badly():
     start = sm.area_map(solid.surface, ratio=1.5, keep_best=True)
     result = sm.volume_map(solid, start=start)
     assert "are held" in result.stop_reason
-    assert np.abs(result.distortion.ratios - 1.0).mean() > engine._UNEVEN
+    assert mean_error(result) > engine._UNEVEN
     assert not result.refinement.halved
 
 
@@ -71,7 +80,7 @@ def test_no_vertices_where_they_are_not_allowed(solid):
     whole = refine_overconstrained(solid).solid
     result = sm.volume_map(whole, options=sm.VolumeOptions(refine=False))
     assert result.mesh.n_tets == whole.n_tets
-    assert np.abs(result.distortion.ratios - 1.0).mean() > engine._UNEVEN
+    assert mean_error(result) > engine._UNEVEN
 
 
 @pytest.mark.parametrize("served", [0, 1])
