@@ -346,12 +346,12 @@ def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> 
     monkeypatch.setattr(finer, "ROUND_STEPS", 3)
     made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
     n_faces = start.level.surface.n_faces
-    work = Work(n_faces, 200.0 * n_faces, 40)
+    work = Work(n_faces, 150.0 * n_faces, 40)  # less than brings the energy to rest
     found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
     assert found is not None and len(asked) >= 2 and found[1].added.n_split
     assert [record.iteration for record in found[0].history].count(0) == 2
     # All but a share kept for rings, which did not become exact here.
-    assert work.steps(found[1].level.surface.n_faces) <= 11
+    assert work.steps(found[1].level.surface.n_faces) <= 1
 
 
 def test_slivers_are_asked_for_less() -> None:
