@@ -8,50 +8,32 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..base.arrays import read_only
 from ..base.budget import Budget
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import TWO_PI, Torus
-from ..certificate.checks import certify
 from ..conformal.map import ConformalMap, conformal_map
-from ..errors import CertificationError, OptionError, SolverError
+from ..errors import CertificationError, OptionError
 from ..homology.basis import HomologyBasis
-from ..maps.history import IterationRecord
 from ..mesh.given import as_surface, require_same_mesh
-from ..mesh.halved_faces import SurfaceRefinement
 from .coarse import Level, levels
-from .finer import ROUND_STEPS, Finer, goal, mapped_finer
+from .finest import Finest
 from .finish import Steps, cut_short, finish_areas, unfolded
 from .flat import unfolded_turns
-from .result import AreaMap
-from .route import EASING, EqualAreas, Finish, Made, Route, best_turns, follow
-from .search import Ratio, search_phase
+from .result import AreaMap, mapped, moved
+from .route import EqualAreas, Finish, Route, follow
+from .search import Ratio
 from .work import Work
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["SHAPES", "Finish", "area_map", "charted", "equal_areas", "finished", "turned"]
+__all__ = ["Finish", "area_map", "charted", "equal_areas", "finished", "turned"]
 
 _log = logging.getLogger("stretchmap")
 
 _MOST_TURNS = 1e3  # a phase may have
-# Weights of shape in the chart where equal areas leave faces folded: few edges round a branch span
-# so much of the torus then that what lies between two rounds of them is cut off.
-SHAPES = (1.0, 10.0, 100.0, 1e3)
-# The same where the surface is to become finer. Areas are less equal in such a chart, so edges are
-# halved for good only once they are nearly right: until then up to that sag is left.
-_EASED = (0.01, 0.1, 1.0)
-_COARSELY = 3.0
-_RESERVED = (
-    0.25  # share of the work, for the surface as it is, until no face of a finer one is folded
-)
-_AT_ONCE = 0.6  # share of all faces that there may be, that this may take
 
 
 @takes_threads
@@ -221,158 +203,12 @@ def _found(
     stack = levels(equal.level)
     refine = refine and len(stack) == 1
     work = Work.of(surface, budget, refine=refine)
-    found = _finest(route, stack, equal, conformal, progress, torus, refine, work)
+    found = Finest(route, stack, equal, torus, work, progress).found(refine=refine)
     if not (work.hurried and cut_short(found.stop_reason)):
         return found
     return dataclasses.replace(
         found, stop_reason=f"the time limit was reached; {found.stop_reason}"
     )
-
-
-def _finest(
-    route: Route,
-    stack: list[Level],
-    equal: EqualAreas,
-    conformal: ConformalMap,
-    progress: Progress | None,
-    torus: Torus | None,
-    refine: bool,
-    work: Work,
-) -> AreaMap:
-    """The same, of a surface as fine as there is work for."""
-    surface, finer, coarse = equal.level.surface, None, False
-    wanted = goal(surface, route.steps.tol)
-    if refine:
-        work.reserved = _RESERVED
-        coarse, finer = _finer_at_once(route, equal, wanted, progress, torus, work)
-        work.reserved = 0.0
-        if finer is not None and finer.certificate.certified:
-            return finer
-    found = _along(route, stack, equal, conformal, progress, torus, work, alone=not coarse)
-    unfinished = not _good(found, wanted) or cut_short(found.stop_reason)
-    if finer is None and refine and unfinished and not _folded(found):
-        level = Level.of(surface, found.angles / TWO_PI, conformal.forms, conformal.aspect)
-        start = Finer.of(level, found.angles, found.ratio)
-        made = Made(
-            found.angles, found.phase, found.ratio, list(found.history),
-            found.converged, found.stop_reason, dict(found.seconds),
-        )  # fmt: skip
-        finer = _finer(route, start, made, wanted, progress, torus, work)
-    if finer is None or not finer.certificate.certified:
-        return found
-    if not found.certificate.certified:
-        return finer
-    return min(found, finer, key=lambda each: each.distortion.element_std)
-
-
-def _finer_at_once(
-    route: Route,
-    equal: EqualAreas,
-    wanted: float,
-    progress: Progress | None,
-    torus: Torus | None,
-    work: Work,
-) -> tuple[bool, AreaMap | None]:
-    """Whether this surface is too coarse for its place in the chart; if so, the map of a finer one.
-
-    From a chart eased towards shapes: in one where areas alone count, faces can be needles by the
-    thousand. Where that takes too many faces or leaves some folded, from charts eased further.
-    """
-    clock = time.perf_counter()
-    level = equal.level
-    turns, (phase, ratio, _), records = best_turns(route, equal)
-    work.spend_in_chart(sum(record.stage == "balance" for record in records))
-    if not Finer.wrapped(level, turns, phase, ratio).too_coarse():
-        return False, None
-    for shape in _EASED:
-        if work.steps() < ROUND_STEPS:
-            return True, None
-        turns, more = equal.eased(shape, turns)
-        records = records + more
-        work.spend_in_chart(len(more))
-        given = (route.phase, route.ratio)
-        phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
-        finer = Finer.wrapped(level, turns, phase, ratio).fitted(_COARSELY, _AT_ONCE)
-        work.spend_on_fitting((finer.level.surface if finer else level.surface).n_faces)
-        if finer is not None:
-            seconds = {"sem": time.perf_counter() - clock}
-            made = Made(finer.angles, phase, ratio, records, seconds=seconds)
-            found = _finer(route, finer, made, wanted, progress, torus, work)
-            if found is not None:
-                return True, found
-    return True, None
-
-
-def _finer(
-    route: Route,
-    start: Finer,
-    made: Made,
-    wanted: float,
-    progress: Progress | None,
-    torus: Torus | None,
-    work: Work,
-) -> AreaMap | None:
-    rings = route.finish == "ring"
-    found = mapped_finer(start, made, route.steps, wanted, rings, progress, work)
-    if found is None:
-        return None
-    made, finer = found
-    added = finer.added if finer.added.n_split else None
-    return _result(finer.level.surface, finer.level.forms, made, torus, added)
-
-
-def _good(found: AreaMap, face_std: float) -> bool:
-    return found.certificate.certified and found.distortion.element_std <= face_std
-
-
-def _along(
-    route: Route,
-    stack: list[Level],
-    equal: EqualAreas,
-    conformal: ConformalMap,
-    progress: Progress | None,
-    torus: Torus | None,
-    work: Work,
-    *,
-    alone: bool,
-) -> AreaMap:
-    """The map a route leads to, certified or not; by rising weights of shape while it is folded.
-
-    Unless areas ``alone`` are worth a try, with some weight of shape at once.
-    """
-    finest = equal.level
-    surface, forms = finest.surface, conformal.forms
-    found = None
-    for shape in (0.0, *SHAPES) if alone else SHAPES:
-        along, way = dataclasses.replace(route, shape=shape), stack
-        if shape > 0.0:
-            if found is not None:
-                if found.certificate.certified or not _folded(found) or work.clock.spent:
-                    return found
-                _log.info("%s: with weight %g of shape", found.certificate.reason, shape)
-            equal.shaped(shape, EASING)
-            way = [finest]
-        try:
-            made = follow(along, way, progress, equal if len(way) == 1 else None, work)
-        except SolverError as error:  # sizes of faces are lost in rounding; what there is, stands
-            if found is None:
-                raise
-            _log.info("%s", error)
-            continue
-        if shape > 0.0:
-            made.reason = f"faces folded where areas alone counted; {made.reason}"
-        other = _result(surface, forms, made, torus)
-        if found is None or other.certificate.certified or _folded(other) < _folded(found):
-            found = other
-    assert found is not None
-    if found.certificate.certified or not _folded(found):
-        return found
-    clock = time.perf_counter()
-    newton = finest.newton(found.angles, found.ratio)
-    limited = dataclasses.replace(route.steps, max_iter=min(route.steps.max_iter, work.steps()))
-    records, _, reason = finish_areas(newton, False, limited, progress, late=work.late)
-    found = _moved(found, newton.angles, records, clock)
-    return dataclasses.replace(found, converged=False, stop_reason=reason)
 
 
 def equal_areas(
@@ -398,41 +234,7 @@ def charted(
     surface = equal.level.surface
     unbounded = Work.of(surface, Budget(math.inf), refine=False)
     made = follow(route, [equal.level], progress, equal, unbounded)
-    return _result(surface, conformal.forms, made, torus)
-
-
-def _folded(found: AreaMap) -> int:
-    """Faces that look inward or cross each other, at most a thousand or two of each."""
-    ids = found.certificate.ids
-    return sum(len(ids.get(check, ())) for check in ("boundary_oriented", "boundary_embedded"))
-
-
-def _result(
-    surface: TriMesh,
-    forms: NDArray[np.int32],
-    made: Made,
-    torus: Torus | None,
-    refinement: SurfaceRefinement | None = None,
-) -> AreaMap:
-    clock = time.perf_counter()
-    torus = torus or Torus.from_ratio(made.ratio, area=surface.area)
-    image = torus.xi(made.angles[:, 0], made.angles[:, 1])
-    certificate = certify(surface, image, torus)
-    return AreaMap(
-        mesh=surface,
-        angles=read_only(made.angles),
-        image=read_only(image),
-        torus=torus,
-        phase=made.phase,
-        ratio=made.ratio,
-        forms=forms,
-        refinement=refinement,
-        certificate=certificate,
-        history=tuple(made.history),
-        converged=made.converged,
-        stop_reason=made.reason,
-        seconds={**made.seconds, "certificate": time.perf_counter() - clock},
-    )
+    return mapped(surface, conformal.forms, made, torus)
 
 
 def _start(
@@ -465,7 +267,7 @@ def finished(
     newton, unfolding = unfolded(level, start.angles, start.ratio, progress)
     steps = Steps(max_iter, tol, math.inf)
     records, converged, reason = finish_areas(newton, False, steps, progress)
-    found = _moved(start, newton.angles, unfolding + records, clock)
+    found = moved(start, newton.angles, unfolding + records, clock)
     return dataclasses.replace(found, converged=converged, stop_reason=reason)
 
 
@@ -475,25 +277,11 @@ def turned(start: AreaMap, progress: Progress | None = None) -> AreaMap:
     newton, records = unfolded(_level_of(start), start.angles, start.ratio, progress, keep=True)
     if not records:
         return start
-    return _moved(start, newton.angles, records, clock)
+    return moved(start, newton.angles, records, clock)
 
 
 def _level_of(found: AreaMap) -> Level:
     return Level.of(found.mesh, found.angles / TWO_PI, found.forms, found.ratio)
-
-
-def _moved(
-    start: AreaMap, angles: NDArray[np.float64], records: list[IterationRecord], clock: float
-) -> AreaMap:
-    image = start.torus.xi(angles[:, 0], angles[:, 1])
-    return dataclasses.replace(
-        start,
-        angles=read_only(angles),
-        image=read_only(image),
-        certificate=certify(start.mesh, image, start.torus),
-        history=start.history + tuple(records),
-        seconds={**start.seconds, "finish": time.perf_counter() - clock},
-    )
 
 
 def _check_options(

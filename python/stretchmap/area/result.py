@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import read_only
 from ..base.options import instance
 from ..base.torus import Torus
+from ..certificate.checks import certify
 from ..certificate.findings import Certificate
 from ..errors import OptionError
+from ..maps.history import IterationRecord
 from ..maps.result import MapResult
 from ..mesh.halved_faces import SurfaceRefinement
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
+    from .route import Made
 
-__all__ = ["AreaMap"]
+__all__ = ["AreaMap", "mapped", "moved", "n_folded"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -114,3 +120,53 @@ class AreaMap(MapResult):
         if not math.isclose(torus.ratio, self.ratio, rel_tol=1e-9):
             raise OptionError(f"the map is for R / r = {self.ratio}, the torus has {torus.ratio}")
         return torus.xi(self.angles[:, 0], self.angles[:, 1])
+
+
+def mapped(
+    surface: TriMesh,
+    forms: NDArray[np.int32],
+    made: Made,
+    torus: Torus | None,
+    refinement: SurfaceRefinement | None = None,
+) -> AreaMap:
+    """The map of angles, with its certificate."""
+    clock = time.perf_counter()
+    torus = torus or Torus.from_ratio(made.ratio, area=surface.area)
+    image = torus.xi(made.angles[:, 0], made.angles[:, 1])
+    certificate = certify(surface, image, torus)
+    return AreaMap(
+        mesh=surface,
+        angles=read_only(made.angles),
+        image=read_only(image),
+        torus=torus,
+        phase=made.phase,
+        ratio=made.ratio,
+        forms=forms,
+        refinement=refinement,
+        certificate=certificate,
+        history=tuple(made.history),
+        converged=made.converged,
+        stop_reason=made.reason,
+        seconds={**made.seconds, "certificate": time.perf_counter() - clock},
+    )
+
+
+def moved(
+    start: AreaMap, angles: NDArray[np.float64], records: list[IterationRecord], clock: float
+) -> AreaMap:
+    """A map whose vertices steps have moved on since ``clock``, certified anew."""
+    image = start.torus.xi(angles[:, 0], angles[:, 1])
+    return dataclasses.replace(
+        start,
+        angles=read_only(angles),
+        image=read_only(image),
+        certificate=certify(start.mesh, image, start.torus),
+        history=start.history + tuple(records),
+        seconds={**start.seconds, "finish": time.perf_counter() - clock},
+    )
+
+
+def n_folded(found: AreaMap) -> int:
+    """Faces that look inward or cross each other, at most a thousand or two of each."""
+    ids = found.certificate.ids
+    return sum(len(ids.get(check, ())) for check in ("boundary_oriented", "boundary_embedded"))

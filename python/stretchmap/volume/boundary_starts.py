@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from .. import _core
+from ..area.finest import SHAPES
 from ..area.finish import Steps
-from ..area.map import SHAPES, charted, equal_areas, finished, turned
+from ..area.map import charted, equal_areas, finished, turned
 from ..area.result import AreaMap
 from ..area.route import Route
 from ..area.search import Ratio

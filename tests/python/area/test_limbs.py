@@ -13,7 +13,6 @@ import stretchmap as sm
 from shapes import with_branch, with_limb
 from stretchmap import _core
 from stretchmap.area import finish, limbs
-from stretchmap.area import map as area
 from stretchmap.area.flat import unfolded_turns
 from stretchmap.area.limbs import spread_limbs
 from stretchmap.errors import CertificationError, SolverError
@@ -142,7 +141,7 @@ def test_areas_give_way_where_they_would_fold_faces(monkeypatch, n_tets, rings):
     finer = sm.area_map(surface)
     assert finer.certificate.certified
     assert finer.distortion.element_std < 0.9 * found.distortion.element_std
-    monkeypatch.setattr(area, "SHAPES", ())
+    monkeypatch.setattr("stretchmap.area.finest.SHAPES", ())
     with pytest.raises(CertificationError, match="folded"):
         sm.area_map(surface, refine=False)
 

@@ -10,7 +10,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import TriMesh, _core
-from stretchmap.area import finer
+from stretchmap.area import finer, finest
 from stretchmap.area.coarse import Level
 from stretchmap.area.finer import Finer, goal, mapped_finer
 from stretchmap.area.finish import Pace, Steps, approach_areas, finish_areas, unfold_faces
@@ -250,6 +250,28 @@ def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
         work = Work(start.level.surface.n_faces, 1e9, 40, reserved=0.25)
         assert mapped_finer(start, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work) is None
         assert len(taken) == times and work.reserved == 0.25
+
+
+def test_a_chart_lost_in_rounding_is_passed_over(monkeypatch) -> None:
+    """Where the surface is too coarse and no finer one serves, the next weight of shape follows."""
+    surface = sm.samples.bumpy_torus(1000).surface
+    monkeypatch.setattr(finest.Finest, "_finer_at_once", lambda self: (True, None))
+    made, weights = finest.Finest._made, []
+
+    def first_lost(self: finest.Finest, shape: float) -> Made:
+        weights.append(shape)
+        if len(weights) == 1:
+            raise sm.errors.SolverError("lost")
+        return made(self, shape)
+
+    monkeypatch.setattr(finest.Finest, "_made", first_lost)
+    found = sm.area_map(surface, keep_best=True)
+    assert weights == list(finest.SHAPES[:2]) and found.certificate.certified
+    assert found.stop_reason.startswith("too coarse for equal areas; ")
+    monkeypatch.setattr(finest, "SHAPES", finest.SHAPES[:1])
+    weights.clear()
+    with pytest.raises(sm.errors.SolverError, match="lost"):
+        sm.area_map(surface, keep_best=True)
 
 
 def test_solves_beyond_one_a_step_are_counted() -> None:
