@@ -127,6 +127,7 @@ void bind_glide(py::module_& m) {
       .def("least_facing", &SurfaceNewton::facing, release_gil())
       .def("flops", &SurfaceNewton::flops, release_gil())
       .def_property_readonly("solves", &SurfaceNewton::solves)
+      .def_property_readonly("curvature", &SurfaceNewton::curvature)
       .def_property_readonly("angles", &SurfaceNewton::angles, py::return_value_policy::copy);
 }
 

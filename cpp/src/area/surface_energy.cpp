@@ -14,10 +14,6 @@ namespace stretchmap::area {
 
 namespace {
 
-// A quarter of the areas' own curvature in the model: with all of it the last per cent of the area
-// ratios takes ever more steps, with none of it the steps get short.
-constexpr double kModelCurvature = 0.25;
-
 // Share of its own area up to which a face has to look outward for the barrier to leave it alone:
 // of the faces of a map that is nearly done few have less.
 constexpr double kFacing = 0.5;
@@ -132,9 +128,7 @@ void add_shape(const Jet& d, const Jet& a, double weight, bool second, Jet& sum)
 
 Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                 const std::vector<TorusPoint>& points, const Points2Ref& angles, Index f,
-                Derivatives derivatives) {
-  const bool second = derivatives != Derivatives::kNone;
-  const double curvature = derivatives == Derivatives::kModel ? kModelCurvature : 1.0;
+                bool second, double curvature) {
   TorusPoint p[3];
   Eigen::Vector2d angle[3];
   for (int k = 0; k < 3; ++k) {
@@ -181,9 +175,10 @@ Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, doub
 }  // namespace
 
 GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
-                         const Points2Ref& angles, Derivatives derivatives) {
+                         const Points2Ref& angles, Derivatives derivatives, double curvature) {
   const Index m = static_cast<Index>(problem.chart.faces.rows());
   const bool second = derivatives != Derivatives::kNone;
+  if (derivatives != Derivatives::kModel) curvature = 1.0;
   const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
   Vec values(m);
   Rows gradients(second ? m : 0, 6);
@@ -191,7 +186,7 @@ GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weig
   if (second) energy.hessians.resize(m, 36);
   for_chunks(m, kCostlyChunk, [&](Index begin, Index end) {
     for (Index f = begin; f < end; ++f) {
-      const Jet jet = face_energy(problem, weights, scale, points, angles, f, derivatives);
+      const Jet jet = face_energy(problem, weights, scale, points, angles, f, second, curvature);
       values(f) = jet.value;
       if (!second) continue;
       gradients.row(f) = jet.gradient;

@@ -19,7 +19,8 @@ constexpr int kRingSteps = 20;       // towards it at most
 constexpr int kWorth = 8;            // steps a factor is kept for: a new one costs as much
 constexpr double kSlack = 1.2;       // the steps that follow those best for the faces gain at most
 constexpr int kGlideTries = 30;
-constexpr double kHoldRotation = 1e-9;  // of the mean diagonal: holds the rotation about the axis
+constexpr double kLeastCurvature = 0.1;  // where steps are as long as they may be
+constexpr double kHoldRotation = 1e-9;   // of the mean diagonal: holds the rotation about the axis
 
 Points2 as_rows(const Vec& vector) {
   return Eigen::Map<const Points2>(vector.data(), vector.size() / 2, 2);
@@ -50,7 +51,8 @@ SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
 
 NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) {
   const double scale = best_scale(problem_, angles_);
-  GlideEnergy here = glide_energy(problem_, weights, scale, angles_, Derivatives::kModel);
+  GlideEnergy here =
+      glide_energy(problem_, weights, scale, angles_, Derivatives::kModel, curvature_);
   rings_.reset();
   const auto solve = [&](const Rows& hessians) {
     ++solves_;
@@ -70,6 +72,8 @@ NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) 
     const bool sound = folded_faces(problem_.chart, trial / kTwoPi).empty();
     return sound ? there : std::numeric_limits<double>::infinity();
   });
+  curvature_ = result.step == longest ? std::max(0.5 * curvature_, kLeastCurvature)
+                                      : std::min(2.0 * curvature_, kModelCurvature);
   if (result.step > 0.0) {
     angles_ = std::move(trial);
     result.after = there;

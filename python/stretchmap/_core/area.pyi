@@ -118,6 +118,9 @@ class SurfaceNewton:
     def angles(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
         ...
     @property
+    def curvature(self) -> float:
+        ...
+    @property
     def solves(self) -> int:
         ...
 def angle_from_equal_area(s: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], tube_ratio: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:

@@ -26,6 +26,10 @@ _GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
 _LIGHT = 4.0**3  # more of it from afar lets faces that are too coarse stand up from the torus
 _NEAR = 0.1  # face SD up to which steps may let faces look inward
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
+# Barriers much lighter than the error let steps run up against them; so heavy they are at least, in
+# units of its square, less by a factor where long steps gain less than that share of the energy.
+_CENTERED, _FADING = 10.0, 0.7
+_LONG_STEP, _LITTLE = 0.9, 0.1
 _AT_REST, _MOST_DONE = "energy at rest", "most steps done"
 _STALLED = 3  # steps in a row without any length end the iteration
 _ROUGH = 8.0  # times the tolerance
@@ -199,18 +203,22 @@ def finish_areas(
     weight, least, heaviest = pace.weight, math.inf, _MOST_WEIGHT**steps.balance
     barrier = _FACING if newton.least_facing() > 0.0 else 0.0
     shape = _shape_weight(newton) if steps.balance == 1.0 else _SHAPE
-    taken = None
+    center = _Center(_CENTERED if steps.balance == 1.0 else 0.0)
+    taken, error = None, math.inf
     at_rest = _rest()
     reason = _MOST_DONE
     for iteration in range(steps.max_iter + 1):
         if iteration:
             if late is not None and late():
                 break
-            taken = newton.step(_weights(weight, barrier, shape))
+            walls = center.least(error)
+            taken = newton.step(_weights(weight, barrier, shape, walls=walls))
+            center.move_on(taken)
             if taken.step >= _FULL_STEP:
                 weight = min(weight * _GROWTH, heaviest)
         measured = newton.measures()
-        least, pace.weight = min(least, measured.angle_mean), weight
+        error, pace.weight = measured.face_std, weight
+        least = min(least, measured.angle_mean)
         history.append(_record("newton", iteration, taken, measured, start))
         report(progress, "area", iteration, steps.max_iter, face_std=measured.face_std)
         if steps.balance == 1.0 and measured.face_std <= _MARGIN * tol and _within(measured, worst):
@@ -262,11 +270,33 @@ def _rest() -> Callable[[_core.area.NewtonStep], bool]:
     return at_rest
 
 
+@dataclass
+class _Center:
+    """How heavy barriers are at least, over the square of the face SD."""
+
+    share: float
+
+    def least(self, face_std: float) -> float:
+        """Weight over that of the areas."""
+        return self.share * face_std**2
+
+    def move_on(self, taken: _core.area.NewtonStep) -> None:
+        """Nearer to the walls where long steps gain little, back where they are short."""
+        if taken.step < _FULL_STEP:
+            self.share = min(self.share / _FADING, _CENTERED)
+        elif taken.step > _LONG_STEP and taken.before - taken.after < _LITTLE * abs(taken.before):
+            self.share *= _FADING
+
+
 def _weights(
-    area: float, facing: float, shape: float, epsilon: float = 0.0
+    area: float, facing: float, shape: float, epsilon: float = 0.0, walls: float = 0.0
 ) -> _core.area.SurfaceWeights:
-    """The weight of the areas is one, that of the rest falls as theirs is to grow."""
-    shape, chart, facing = shape / area, _CHART / area, facing / area
+    """The weight of the areas is one, that of the rest falls as theirs is to grow.
+
+    That of barriers not below ``walls``.
+    """
+    shape, chart = shape / area, max(_CHART / area, walls)
+    facing *= max(1.0 / area, walls)
     return _core.area.SurfaceWeights(shape=shape, chart=chart, facing=facing, epsilon=epsilon)
 
 

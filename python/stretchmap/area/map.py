@@ -52,7 +52,7 @@ def area_map(
     balance: float = 1.0,
     sem_iter: int = 10,
     refine: bool = True,
-    time_limit: float = 1e-3,
+    time_limit: float = 2e-3,
     keep_best: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -104,7 +104,8 @@ def area_map(
         than ``surface``. Not with ``finish="none"`` or a ``balance`` below 1.
     time_limit : float
         Processor seconds per face, of all threads, that may be spent: where they are used up, the
-        steps end. Small surfaces get some seconds.
+        steps end. Small surfaces get some seconds. Twice what a tet may take, as a solid has about
+        two and a half tets per face of its surface.
     keep_best : bool
         Return the map even if it is not certified.
     threads : int, optional
@@ -147,7 +148,7 @@ def area_map(
     nearly right areas, edges that sag too much by then are halved, too, as are those of faces left
     looking inward; then the steps above follow. Where areas stay off, the edges that sag most in
     faces that are off are halved, three times at most. All steps together cost no more than some
-    two hundred on the surface itself, more on one of less than 4,000 faces, and no more than
+    four hundred on the surface itself, more on one of less than 4,000 faces, and no more than
     ``time_limit``.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting

@@ -12,7 +12,7 @@ from ..mesh.surfaces import TriMesh
 
 # In units of what a face adds to a step besides its share of the elimination: so many a face of
 # the surface given, and no fewer than those.
-_EACH, _LEAST = 380.0, 1.5e6
+_EACH, _LEAST = 760.0, 3e6
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
 _UNREFINED = 40  # steps where edges can be halved after them

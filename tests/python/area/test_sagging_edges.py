@@ -10,7 +10,7 @@ import pytest
 
 import stretchmap as sm
 from stretchmap import TriMesh, _core
-from stretchmap.area import finer, finest
+from stretchmap.area import finer, finest, finish
 from stretchmap.area.coarse import Level
 from stretchmap.area.finer import Finer, goal, mapped_finer
 from stretchmap.area.finish import Pace, Steps, approach_areas, finish_areas, unfold_faces
@@ -300,6 +300,34 @@ def test_charts_are_eased_where_halving_takes_too_many_faces(seed: int) -> None:
     assert not eased.converged and "face SD" in eased.stop_reason
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_barriers_as_heavy_as_the_error_leave_steps_long(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surface, shares = small_handle(seed), []
+    for centered in (finish._CENTERED, 0.0):
+        monkeypatch.setattr(finish, "_CENTERED", centered)
+        found = sm.area_map(surface)
+        steps = [r.step for r in found.history if r.stage == "newton" and np.isfinite(r.step)]
+        shares.append(np.mean(np.array(steps) > 0.9))
+        if centered:
+            assert found.converged
+    assert shares[0] > 0.65 and shares[1] < 0.5
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_less_curvature_is_modeled_after_long_steps(seed: int) -> None:
+    newton = start_of(small_handle(seed)).newton()
+    steps, curvature = [], [newton.curvature]
+    for weight in (1.0, 1.0, 0.1, 0.1, 1e-3, 1e-3, 1e-3):
+        steps.append(newton.step(_core.area.SurfaceWeights(chart=weight)).step)
+        curvature.append(newton.curvature)
+    assert curvature[:3] == [0.25, 0.125, 0.1] and min(steps[:2]) > 0.9
+    short = int(np.argmin(steps))
+    assert steps[short] < 0.5 and curvature[short + 1] == 2.0 * curvature[short]
+    assert min(curvature) == 0.1
+
+
 def test_rings_are_made_exact_only_where_faces_are_good() -> None:
     surface = small_handle(0)
     far, good = sm.area_map(surface, tol=1e-4), sm.area_map(surface, tol=0.1)
@@ -321,7 +349,7 @@ def test_steps_are_counted_by_their_faces() -> None:
     left = work.steps()
     work.spend_in_chart(10)
     assert left - 10 < work.steps() < left
-    work.spend(300)
+    work.spend(600)
     assert work.steps() == 0 and work.steps(least=10) == 10 and not work.hurried
     small = sm.samples.torus_surface()
     unrefined = Work.of(small, Budget(np.inf), refine=False)
@@ -368,7 +396,7 @@ def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> 
     monkeypatch.setattr(finer, "ROUND_STEPS", 3)
     made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
     n_faces = start.level.surface.n_faces
-    work = Work(n_faces, 150.0 * n_faces, 40)  # less than brings the energy to rest
+    work = Work(n_faces, 100.0 * n_faces, 40)  # less than brings the energy to rest
     found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
     assert found is not None and len(asked) >= 2 and found[1].added.n_split
     assert [record.iteration for record in found[0].history].count(0) == 2

@@ -46,14 +46,19 @@ struct GlideEnergy {
   Rows hessians;       // (m, 36) one 6x6 matrix per face, empty if not asked for
 };
 
+// Most of the areas' own curvature in the model: with all of it the last per cent of the area
+// ratios takes ever more steps, with none of it the steps get short.
+inline constexpr double kModelCurvature = 0.25;
+
 enum class Derivatives { kNone, kHessian, kModel };
 
 // \param angles (n, 2) (u, v) in radians.
 // \param derivatives kHessian is exact; kModel is what Newton steps use: positive semi-definite
-// face
-//        by face, with a part of the areas' own curvature only.
+//        face by face, with a part of the areas' own curvature only.
+// \param curvature that part.
 GlideEnergy glide_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
-                         const Points2Ref& angles, Derivatives derivatives);
+                         const Points2Ref& angles, Derivatives derivatives,
+                         double curvature = kModelCurvature);
 
 // \return the scale at which the area term is least: (sum (w rho^2) / sum (w / rho^2))^(1/4), with
 //         rho = |g| / |t|.

@@ -42,6 +42,8 @@ class SurfaceNewton {
   double flops();
   // So far: more than steps where faces had to be damped.
   int solves() const { return solves_; }
+  // Of the areas in the model of the next step: less after a step as long as it might be.
+  double curvature() const { return curvature_; }
 
   const Points2& angles() const { return angles_; }
   const GlideProblem& problem() const { return problem_; }
@@ -54,6 +56,7 @@ class SurfaceNewton {
   Points2 angles_;
   FaceDamping damping_;
   int solves_ = 0;
+  double curvature_ = kModelCurvature;
   std::optional<ChartSystem> system_;  // of these two one at a time
   std::optional<RingSystem> rings_;
 };
