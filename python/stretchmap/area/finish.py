@@ -27,8 +27,9 @@ _LIGHT = 4.0**3  # more of it from afar lets faces that are too coarse stand up 
 _NEAR = 0.1  # face SD up to which steps may let faces look inward
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
 # Barriers much lighter than the error let steps run up against them; so heavy they are at least, in
-# units of its square, less by a factor where long steps gain less than that share of the energy.
-_CENTERED, _FADING = 10.0, 0.7
+# units of its square, less by a factor where long steps gain less than that share of the energy;
+# but never more than that, or they alone would count from afar.
+_CENTERED, _FADING, _WALLS = 10.0, 0.7, 0.2
 _LONG_STEP, _LITTLE = 0.9, 0.1
 _AT_REST, _MOST_DONE = "energy at rest", "most steps done"
 _STALLED = 3  # steps in a row without any length end the iteration
@@ -278,7 +279,7 @@ class _Center:
 
     def least(self, face_std: float) -> float:
         """Weight over that of the areas."""
-        return self.share * face_std**2
+        return min(self.share * face_std**2, _WALLS)
 
     def move_on(self, taken: _core.area.NewtonStep) -> None:
         """Nearer to the walls where long steps gain little, back where they are short."""
