@@ -318,7 +318,7 @@ def test_refinement_is_reported_or_refused(load_solid):
 
 @pytest.mark.parametrize(("rings", "rel"), [(True, 1e-3), (False, 1e-2)])
 def test_renumbering_rotating_and_scaling_the_input_changes_nothing(bumpy, rings, rel):
-    """The own boundary map stops at a tolerance of the faces; how far beyond depends on rounding."""
+    """The own boundary map stops at a tolerance; how far beyond it depends on rounding."""
 
     def distortion(solid):
         start = sm.area_map(solid.surface, tol=0.02) if rings else None
