@@ -4,7 +4,8 @@
     python bench/speed.py --draw docs/data/speed.json        # the table again, nothing measured
 
 Volume maps of ``--cases``: meshes by name, or tori of so many tets; area maps of ``--surfaces``:
-shaken tori of so many faces. Rows of a file that is there are kept unless they are measured again.
+shaken tori of so many faces. Rows of a file that is there are kept, in their places, unless they are
+measured again.
 
 FOLDER holds the built package ``stretchmap``: the ``python`` folder of a checkout built in place,
 or ``site-packages``. Every run is a process of its own, and the two builds take turns, so that both
@@ -24,6 +25,7 @@ from typing import Any
 
 from speed_page import HERE, METHODS, PACKAGE, parser_of, run_worker, save, show
 
+KEYS = ("case", "method", "threads", "build")  # of a row
 SURFACE = "area"  # the method of surfaces
 MESHES = ("petal_ring_synth_14506", "vertebra_L3_ssm_16420", "rocker_arm_25182", "kitten_21584")
 
@@ -118,11 +120,12 @@ def jobs_of(options: argparse.Namespace) -> list[tuple[str, str, dict[str, Any]]
 def measure(options: argparse.Namespace) -> dict[str, Any]:
     """Rows of all cases, methods and numbers of threads; each build's best of the repeats."""
     builds = {"before": options.before, "after": options.after}
-    rows: list[dict[str, Any]] = []
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
     if options.json and options.json.exists():
-        rows = json.loads(options.json.read_text())["rows"]
+        known = json.loads(options.json.read_text())["rows"]
+        rows = {tuple(row[key] for key in KEYS): row for row in known}
     machine = {"processor": platform.machine(), "cores": os.cpu_count()}
-    data = {"machine": machine, "labels": options.labels, "rows": rows}
+    data = {"machine": machine, "labels": options.labels, "rows": list(rows.values())}
     for case, method, job in jobs_of(options):
         for threads in options.threads:
             best: dict[str, dict[str, Any]] = {}
@@ -133,10 +136,10 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
                     if row["processor_seconds"] < least["processor_seconds"]:
                         best[name] = row
             for name, row in best.items():
-                key = {"case": case, "method": method, "threads": threads, "build": name}
-                rows[:] = [known for known in rows if not key.items() <= known.items()]
-                rows.append({**key, **row})
-                print(rows[-1], flush=True)
+                key = (case, method, threads, name)
+                rows[key] = {**dict(zip(KEYS, key, strict=True)), **row}
+                print(rows[key], flush=True)
+            data["rows"] = list(rows.values())
             save(options.json, data)
     return data
 

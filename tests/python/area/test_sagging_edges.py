@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -313,6 +314,26 @@ def test_barriers_as_heavy_as_the_error_leave_steps_long(
         if centered:
             assert found.converged
     assert shares[0] > 0.65 and shares[1] < 0.5
+
+
+def test_barriers_follow_the_error_and_fade_where_long_steps_gain_little() -> None:
+    center = finish._Center(10.0)
+    assert center.least(0.01) == pytest.approx(1e-3)
+    assert center.least(3.0) == 0.2  # from afar they would be all that counts
+    for step, after, share in (
+        (1.0, 0.95, 7.0),  # long, for little
+        (1.0, 0.8, 7.0),
+        (0.7, 0.95, 7.0),
+        (1.0, 0.99, 4.9),
+        (0.3, 0.95, 7.0),  # short: back again
+        (0.0, 1.0, 10.0),
+        (0.1, 0.99, 10.0),  # as heavy as they were, at most
+    ):
+        center.move_on(SimpleNamespace(step=step, before=1.0, after=after))
+        assert center.share == pytest.approx(share)
+    held = finish._Center(0.0)  # where shapes are kept, the energy stays what it is
+    held.move_on(SimpleNamespace(step=0.1, before=1.0, after=0.9))
+    assert held.least(0.5) == 0.0
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -54,8 +54,8 @@ def test_rows_that_are_there_are_kept_or_replaced(
     assert bench.main([*common, *few, "--methods", "vsem", "--surfaces", "200"]) == 0
     assert [job.get("surface") for job, _, _ in told] == [None, None, 200, 200]
     assert [name for _, _, name in told] == ["old", "new"] * 2
-    assert bench.main([*common, *few, "--methods", "vsem", "--surfaces"]) == 0
+    assert bench.main([*common, *few, "--methods", "vsem", "--surfaces"]) == 0  # in their places
     rows = json.loads(file.read_text())["rows"]
     found = [(r["method"], r["build"], r["processor_seconds"]) for r in rows]
-    assert found == [("area", "before", 3), ("area", "after", 4), ("vsem", "before", 5),
-                     ("vsem", "after", 6)]  # fmt: skip
+    assert found == [("vsem", "before", 5), ("vsem", "after", 6), ("area", "before", 3),
+                     ("area", "after", 4)]  # fmt: skip
