@@ -4,8 +4,8 @@
     python bench/speed.py --draw docs/data/speed.json        # the table again, nothing measured
 
 Volume maps of ``--cases``: meshes by name, or tori of so many tets; area maps of ``--surfaces``:
-shaken tori of so many faces. Rows of a file that is there are kept, in their places, unless they are
-measured again.
+shaken tori of so many faces. Rows of a file that is there are kept, in their places, unless they
+are measured again.
 
 FOLDER holds the built package ``stretchmap``: the ``python`` folder of a checkout built in place,
 or ``site-packages``. Every run is a process of its own, and the two builds take turns, so that both
@@ -41,27 +41,22 @@ def surface_worker(n_faces: int) -> dict[str, Any]:
     """Basis, conformal and area map of a shaken torus in this process."""
     import time
 
-    import numpy as np
-
     import stretchmap as sm
     from surface_stages import generated
-
-    def areas(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        a, b, c = np.moveaxis(points[faces], 1, 0)
-        found = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        return found / found.sum()
 
     sm.area_map(sm.samples.torus_surface(24, 12))
     surface = generated(n_faces)
     base, cpu, wall = peak(), time.process_time(), time.perf_counter()
     result = sm.area_map(surface)
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
-    ratios = areas(result.image, result.mesh.F) / areas(surface.V, surface.F)
+    grown = peak() - base
+    image = sm.TriMesh(result.image, result.mesh.F)
+    ratios = image.face_areas / image.area / (surface.face_areas / surface.area)
     return {
         "elements": surface.n_faces,
         "processor_seconds": cpu,
         "wall_seconds": wall,
-        "bytes_per_element": (peak() - base) / surface.n_faces,
+        "bytes_per_element": grown / surface.n_faces,
         "ratio_std": float(ratios.std()),
         "certified": bool(sm.certify(result.mesh, result.image, result.torus).certified),
         "steps": len(result.history),
