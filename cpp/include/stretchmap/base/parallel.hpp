@@ -1,6 +1,6 @@
 // Loops over rows in fixed chunks: what a chunk computes, and the order in which partial sums are
-// added, do not depend on the number of threads. How many share a loop is decided by its chunks: a
-// chunk should be worth some ten microseconds, and a thread gets two of them or is not called.
+// added, do not depend on the number of threads. How many share a loop is decided by its chunks,
+// each of which should be worth some ten microseconds: a thread gets one of them or is not called.
 #pragma once
 
 #include <algorithm>
@@ -27,11 +27,11 @@ inline constexpr Index kChunk = 2048, kElementChunk = 512, kCostlyChunk = 64;
 
 inline Index chunk_count(Index n, Index size = kChunk) { return (n + size - 1) / size; }
 
-// work(shares) by every thread that takes part, at most `most`.
+// work(shares) by every thread that takes part.
 template <class Work>
-void share_chunks(Index chunks, Index most, Work& work) {
+void share_chunks(Index chunks, Work& work) {
   share_out(
-      chunks, most,
+      chunks,
       [](void* context, Shares& shares) noexcept { (*static_cast<Work*>(context))(shares); },
       &work);
 }
@@ -42,7 +42,7 @@ void for_tasks(Index count, const Body& body) {
   auto work = [&](Shares& shares) {
     for (Index task = shares.next(); task >= 0; task = shares.next()) body(task);
   };
-  share_chunks(count, count, work);
+  share_chunks(count, work);
 }
 
 // body(begin, end) for every chunk of [0, n).
@@ -53,7 +53,7 @@ void for_chunks(Index n, Index size, const Body& body) {
     for (Index c = shares.next(); c >= 0; c = shares.next())
       body(c * size, std::min(n, (c + 1) * size));
   };
-  share_chunks(chunks, chunks / 2, work);
+  share_chunks(chunks, work);
 }
 template <class Body>
 void for_chunks(Index n, const Body& body) {
@@ -82,7 +82,7 @@ void for_chunks_with(Index n, Index size, const Make& make, const Body& body) {
     for (auto workspace = make(); c >= 0; c = shares.next())
       body(c * size, std::min(n, (c + 1) * size), workspace);
   };
-  share_chunks(chunks, chunks / 2, work);
+  share_chunks(chunks, work);
 }
 
 // body(begin, end, sums) adds to sums[0 .. K-1]; the chunks' sums are added in order.

@@ -1,6 +1,7 @@
 // The threads that loops are shared among. Each thread that runs loops has a team of its own, which
-// sleeps between them. Nobody waits for a thread that the system does not run just now: chunks
-// that it has not begun are taken by those that run, and only what it has begun is waited for.
+// looks out for the next one for some microseconds and then sleeps. Nobody waits for a thread that
+// the system does not run just now: chunks that it has not begun are taken by those that run, and
+// only what it has begun is waited for.
 #pragma once
 
 #include <atomic>
@@ -38,9 +39,9 @@ class Shares {
 
 using SharedWork = void (*)(void* context, Shares& shares) noexcept;
 
-// Calls work by as many threads as there are, but no more than `most`. A loop inside of a shared
+// Calls work by as many threads as there are, but no more than chunks. A loop inside of a shared
 // one is run by the thread that comes to it.
-void share_out(Index chunks, Index most, SharedWork work, void* context);
+void share_out(Index chunks, SharedWork work, void* context);
 
 // Processor time in seconds that the calling thread has spent in loops that can be shared, however
 // many threads there are, since it began to count; the first call begins.
