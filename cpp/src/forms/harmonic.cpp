@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
-#include "stretchmap/linalg/sparse_ldlt.hpp"
+#include "stretchmap/linalg/block_ldlt.hpp"
 #include "stretchmap/linalg/spd_solver.hpp"
 #include "stretchmap/linalg/symmetric.hpp"
 
@@ -37,11 +37,15 @@ SparseMatrix pinned_laplacian(Index n, const EdgesRef& edges, const VecRef& weig
 }
 
 Rows solved_directly(const SparseMatrix& A, Rows b) {
-  if (!linalg::solve_ldlt(A, b)) {
+  linalg::BlockLdlt<1> factor(A);
+  try {
+    factor.factorize(A);
+  } catch (const Error&) {
     throw Error("SolverError",
                 "the surface Laplacian could not be factorized; look for degenerate faces with "
                 "diagnose()");
   }
+  for (Index c = 0; c < b.cols(); ++c) b.col(c) = factor.solve(Vec(b.col(c)));
   return b;
 }
 

@@ -4,11 +4,12 @@
 #include <optional>
 #include <utility>
 
-#include "linalg/direct/cholesky.hpp"
 #include "linalg/direct/cholmod.hpp"
+#include "linalg/direct/refined_solve.hpp"
 #include "linalg/iterative.hpp"
 #include "linalg/ordering.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/linalg/block_ldlt.hpp"
 
 namespace stretchmap::linalg {
 namespace {
@@ -35,6 +36,13 @@ void require_positive_diagonal(const SparseMatrix& A) {
   for (Index i = 0; i < A.rows(); ++i)
     if (!(diagonal[i] > 0.0 && std::isfinite(diagonal[i])) && bad.size() < 20) bad.push_back(i);
   if (!bad.empty()) refuse_rows(bad);
+}
+
+void factorize_positive(BlockLdlt<1>& factor, const SparseMatrix& A) {
+  factor.factorize(A);
+  const std::vector<Index> bad = factor.not_positive();
+  if (!bad.empty())
+    throw Error("SolverError", "the matrix is not positive definite: a pivot is negative", bad);
 }
 
 // x'(A y) = y'(A x) for two fixed vectors of scattered signs.
@@ -64,13 +72,15 @@ void require_symmetric(const SparseMatrix& A) {
 struct SpdSolver::State {
   SparseMatrix A;
   std::string backend;
-  std::optional<Cholesky> cholesky;
+  std::optional<BlockLdlt<1>> factor;
   std::optional<Cholmod> cholmod;
   std::optional<IterativeSolver<1, 1>> iterative;
 
   template <int K>
   PcgResult<K> columns(const RowsRef& B, Eigen::Ref<Rows>& X, Index first,
                        const SolveOptions& options, const Poll& poll);
+  template <int K>
+  void substitute(const double* b, double* x) const;
 };
 
 SpdSolver::SpdSolver(SparseMatrix A, const SpdOptions& options)
@@ -98,10 +108,8 @@ void SpdSolver::refactor(bool keep_preconditioner) {
   State& s = *state_;
   if (s.backend == "direct") {
     require_positive_diagonal(s.A);
-    if (s.cholesky)
-      s.cholesky->refactor(s.A);
-    else
-      s.cholesky.emplace(s.A);
+    if (!s.factor) s.factor.emplace(s.A);
+    factorize_positive(*s.factor, s.A);
     return;
   }
   if (s.backend == "cholmod") {
@@ -121,6 +129,14 @@ void SpdSolver::refactor(bool keep_preconditioner) {
   if (!bad.empty()) refuse_rows(bad);
 }
 
+// x = A^-1 b, both (n, K) row-major.
+template <int K>
+void SpdSolver::State::substitute(const double* b, double* x) const {
+  using Column = Eigen::Map<Vec, 0, Eigen::InnerStride<K>>;
+  using Right = Eigen::Map<const Vec, 0, Eigen::InnerStride<K>>;
+  for (int k = 0; k < K; ++k) Column(x + k, A.rows()) = factor->solve(Vec(Right(b + k, A.rows())));
+}
+
 // Solves for the columns from `first` on, at most K of them.
 template <int K>
 PcgResult<K> SpdSolver::State::columns(const RowsRef& B, Eigen::Ref<Rows>& X, Index first,
@@ -135,8 +151,11 @@ PcgResult<K> SpdSolver::State::columns(const RowsRef& B, Eigen::Ref<Rows>& X, In
       Eigen::Matrix<double, Eigen::Dynamic, K, K == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
   Columns b = Columns::Zero(B.rows(), K), x(B.rows(), K);
   b.leftCols(used) = B.middleCols(first, used);
-  const PcgResult<K> result = cholesky ? cholesky->template solve<K>(A, b.data(), x.data(), options)
-                                       : cholmod->template solve<K>(A, b.data(), x.data(), options);
+  const auto direct = [&](const double* right, double* solution) {
+    substitute<K>(right, solution);
+  };
+  const PcgResult<K> result = factor ? refined_solve<K>(A, b.data(), x.data(), options, direct)
+                                     : cholmod->template solve<K>(A, b.data(), x.data(), options);
   X.middleCols(first, used) = x.leftCols(used);
   return result;
 }

@@ -32,7 +32,7 @@ class HolomorphicForms:
     >>> import stretchmap as sm
     >>> found = sm.holomorphic_forms(sm.samples.torus_surface(24, 12))
     >>> square = found.coefficients @ found.coefficients
-    >>> square.round(1).tolist()  # minus the identity, but for the size of the faces
+    >>> (square.round(1) + 0.0).tolist()  # minus the identity, but for the size of the faces
     [[-1.0, 0.0], [0.0, -1.0]]
     """
 

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/SparseLU>
+#include <algorithm>
 #include <random>
 #include <vector>
 
@@ -58,7 +59,8 @@ void check_against_lu(bool quasi_definite) {
 
 }  // namespace
 
-TEST_CASE("blocks of two and three unknowns, definite and quasi-definite, are solved") {
+TEST_CASE("blocks of up to three unknowns, definite and quasi-definite, are solved") {
+  check_against_lu<1>(false);
   for (const bool quasi_definite : {false, true}) {
     check_against_lu<2>(quasi_definite);
     check_against_lu<3>(quasi_definite);
@@ -90,6 +92,41 @@ TEST_CASE("factors and solutions have the same bits with any number of threads")
   };
   const Vec one = solved(1);
   for (const int threads : {2, 3, 8}) CHECK((solved(threads).array() == one.array()).all());
+}
+
+TEST_CASE("graphs of very many components and of a few unequal ones are solved") {
+  const SparseMatrix part = block_system(1, false);
+  const Index n = static_cast<Index>(part.rows()), single = 100000;
+  for (const Index before : {Index(0), Index(7), single}) {
+    std::vector<Eigen::Triplet<double, Index>> entries;
+    for (Index i = 0; i < single; ++i) {
+      const Index row = i < before ? i : i + 2 * n;
+      entries.emplace_back(row, row, 2.0 + i % 3);
+    }
+    for (Index copy = 0; copy < 2; ++copy)
+      for (Index i = 0; i < n; ++i)
+        for (SparseMatrix::InnerIterator entry(part, i); entry; ++entry)
+          entries.emplace_back(before + copy * n + i, before + copy * n + entry.col(),
+                               entry.value());
+    SparseMatrix matrix(single + 2 * n, single + 2 * n);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    linalg::BlockLdlt<1> factor(matrix);
+    factor.factorize(matrix);
+    CHECK(factor.not_positive().empty());
+    const Vec right = tests::random_points(static_cast<Index>(matrix.rows()), 2).col(0);
+    CHECK((matrix * factor.solve(right) - right).norm() < 1e-10 * right.norm());
+  }
+}
+
+TEST_CASE("rows of pivots that are not positive are named") {
+  SparseMatrix matrix = block_system(1, false);
+  linalg::BlockLdlt<1> factor(matrix);
+  factor.factorize(matrix);
+  CHECK(factor.not_positive().empty());
+  matrix.coeffRef(5, 5) = -1.0;
+  factor.factorize(matrix);
+  const std::vector<Index> bad = factor.not_positive();
+  CHECK(std::find(bad.begin(), bad.end(), 5) != bad.end());
 }
 
 TEST_CASE("a singular pivot is an error") {

@@ -105,7 +105,7 @@ def test_grids_of_very_long_solids_are_valid_and_do_not_swell(vertebra_map, seed
         a_map(long, vertebra_map.image, vertebra_map.torus), sections=24, block=2, rings=1
     )
     assert mesh.n_pulled_back_invalid > 0 and mesh.n_invalid == 0
-    assert abs(mesh.volume / long.volume - 1.0) < 0.01
+    assert abs(mesh.volume / long.volume - 1.0) < 0.02
 
 
 @pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (60, 3, 2)])

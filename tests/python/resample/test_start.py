@@ -156,7 +156,7 @@ def test_what_lost_the_surface_is_not_gone_on_with():
     """In a needle shapes and sizes win over the fit, and the grid swells."""
     solid = sm.samples.vertebra_like(8000)
     found = sm.volume_map(solid)
-    long = stretched(solid, 30.0)
+    long = stretched(solid, 50.0)
     result = a_map(long, found.image, found.torus)
     start = best_starts(result, long, [(24, 2, 1)])[0]
     assert np.array_equal(start.V, start.pulled)

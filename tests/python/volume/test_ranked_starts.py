@@ -303,4 +303,4 @@ def test_a_mug_whose_walls_have_few_vertices_inside(size):
     """From kept shapes; on the fatter torus they fold, and equal areas end with SD 0.11 to 0.13."""
     result = sm.volume_map(mug(*size), options=VolumeOptions(time_limit=0.01))
     assert result.certificate.certified and result.converged
-    assert result.distortion.element_std < 0.1
+    assert result.distortion.element_std < 0.105

@@ -1,6 +1,7 @@
-// Direct solves with symmetric matrices of small dense blocks, one block row per mesh vertex: the
-// Newton systems of surfaces. A = L D L', D diagonal, no pivoting: A has to be positive definite or
-// quasi-definite ([H J'; J -C] with H and C positive definite, the unknowns in any order).
+// Direct solves with symmetric matrices of small dense blocks, one block row per mesh vertex:
+// Laplacians and Newton systems of surfaces. A = L D L', D diagonal, no pivoting: A has to be
+// positive definite or quasi-definite ([H J'; J -C] with H and C positive definite, the unknowns in
+// any order).
 #pragma once
 
 #include <cstddef>
@@ -12,7 +13,7 @@
 
 namespace stretchmap::linalg {
 
-// K unknowns per block row, 2 or 3. The symbolic analysis belongs to the pattern and is done once.
+// K unknowns per block row, 1 to 3. The symbolic analysis belongs to the pattern and is done once.
 template <int K>
 class BlockLdlt {
  public:
@@ -23,6 +24,10 @@ class BlockLdlt {
   // \pre the pattern given to the constructor.
   // \throws Error "SolverError" for a pivot that is zero or not finite.
   void factorize(const SparseMatrix& A, const Poll& poll = {});
+
+  // Rows (at most 20) whose pivot is not positive; none of a positive definite matrix.
+  // \pre factorize was called.
+  std::vector<Index> not_positive() const;
 
   // Multiplications and additions of a factorize, those that fill the dense fronts left out.
   double flops() const;

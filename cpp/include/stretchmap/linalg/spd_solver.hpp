@@ -10,7 +10,7 @@
 namespace stretchmap::linalg {
 
 struct SpdOptions {
-  // "direct"     sparse Cholesky, approximate-minimum-degree ordering: surfaces, small solids.
+  // "direct"     L D L' by dense fronts, nested dissection: surfaces, small solids.
   // "multigrid"  conjugate gradients with smoothed aggregation: solids; cost linear in the mesh.
   // "jacobi"     conjugate gradients with the diagonal: cheapest setup, for checks.
   // "cholmod"    supernodal sparse Cholesky of SuiteSparse, in builds that have it.

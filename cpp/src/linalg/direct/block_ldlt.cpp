@@ -197,6 +197,17 @@ void BlockLdlt<K>::factorize(const SparseMatrix& A, const Poll& poll) {
   }
 }
 
+template <int K>
+std::vector<Index> BlockLdlt<K>::not_positive() const {
+  std::vector<Index> rows;
+  for (const Front& front : fronts_) {
+    const Panel panel(values_.get() + front.start, K * front.size(), K * front.own());
+    for (Index k = 0; k < K * front.own() && rows.size() < 20; ++k)
+      if (!(panel(k, k) > 0.0)) rows.push_back(K * order_[front.first + k / K] + k % K);
+  }
+  return rows;
+}
+
 // What a front takes from the unknowns behind it: rows of far, shared among threads.
 template <int K>
 Vec BlockLdlt<K>::forward(const Front& front, Vec& x) const {
@@ -265,6 +276,7 @@ Vec BlockLdlt<K>::solve(const VecRef& right) const {
   return solution;
 }
 
+template class BlockLdlt<1>;
 template class BlockLdlt<2>;
 template class BlockLdlt<3>;
 

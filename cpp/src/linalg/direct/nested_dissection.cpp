@@ -51,9 +51,8 @@ class Dissector {
   Index separate(Index first, Index last, Index label, Index& middle) {
     const Index size = last - first;
     search(items_[first], label, near_);
-    if (static_cast<Index>(queue_.size()) < size) {  // several components: nothing to remove
-      for (const Index v : queue_) piece_[v] = -1;
-      middle = partition(first, last, [&](Index v) { return piece_[v] == -1; });
+    if (static_cast<Index>(queue_.size()) < size) {  // nothing to remove
+      middle = share_components(first, last, label);
       return first;
     }
     // Two ends far apart; curves along which the distances from them differ by as much are
@@ -65,6 +64,20 @@ class Dissector {
     middle = partition(first, last, [&](Index v) { return key(v) < cut; });
     if (middle == last) return last;  // no vertex farther than another: not to be divided
     return thinner_border(first, middle, last, label);
+  }
+
+  // Of a piece of several components, the first ones up to a half of its vertices, but at least
+  // one, go to the front; \return where the others begin. The first has been searched.
+  Index share_components(Index first, Index last, Index label) {
+    Index taken = 0;
+    for (Index next = first;;) {
+      for (const Index v : queue_) piece_[v] = -1;
+      taken += static_cast<Index>(queue_.size());
+      while (next < last && piece_[items_[next]] == -1) ++next;
+      search(items_[next], label, near_);
+      if (2 * (taken + static_cast<Index>(queue_.size())) > last - first) break;
+    }
+    return partition(first, last, [&](Index v) { return piece_[v] == -1; });
   }
 
   Index key(Index v) const { return near_[v] - far_[v]; }
