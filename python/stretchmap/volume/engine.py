@@ -47,6 +47,7 @@ _HOPELESS, _WIDELY = 0.01, 0.005
 _HOPELESS_GIVEN = 0.03
 _FEW_STUCK = 30  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
+_GLIDING = 0.4  # share of the time left before the edges round stuck tets are halved instead
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
@@ -323,9 +324,11 @@ def _patched_gliding(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
 
     Where a coarse boundary pins them, no vertex inside has a place from where it sees all of it.
     """
-    x = run.x
+    x, history = run.x, run.history
+    whole, history.budget = history.budget, history.budget.share(_GLIDING)
     _patched(run, glide=True)
-    left = stuck_tets(run.history.model, run.x, glide=False)
+    history.budget = whole
+    left = stuck_tets(history.model, run.x, glide=False)
     if len(left) < len(stuck):
         return left
     run.x = x
