@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..base.arrays import describe
 from ..base.options import real
 from ..errors import MissingDependencyError, SelfIntersectionError, SolverError
+from .flat_tets import opened
 from .given import as_surface
 from .meshes import TetMesh, TriMesh
 
@@ -56,7 +57,8 @@ def tetrahedralize(
     Notes
     -----
     A constrained Delaunay mesh, refined inside until its tets have the quality asked for (Si 2015,
-    TetGen); edges and faces of the surface are recovered and never split.
+    TetGen); edges and faces of the surface are recovered and never split. What that leaves without
+    volume on flat parts of the surface is split from inside.
 
     Examples
     --------
@@ -77,6 +79,7 @@ def tetrahedralize(
     try:
         solid = TetMesh(*_run_tetgen(surface, options), orient=True)
         _require_same_surface(solid, surface)
+        solid = opened(solid)
     except SolverError:
         _require_no_crossing(surface)  # the reason, as a rule
         raise
