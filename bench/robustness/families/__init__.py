@@ -64,6 +64,7 @@ def families() -> dict[str, Family]:
         drilled,
         handles,
         knots,
+        parts,
         pillars,
         ribbons,
         rings,
@@ -74,6 +75,7 @@ def families() -> dict[str, Family]:
     )
 
     rooms = (
-        tubes, drilled, knots, rings, handles, spiky, coarse, stretched, shells, pillars, ribbons
+        tubes, drilled, knots, rings, handles, spiky, coarse, stretched, shells, pillars, ribbons,
+        parts,
     )  # fmt: skip
     return {family.name: family for room in rooms for family in room.FAMILIES}

@@ -25,7 +25,7 @@ def test_there_are_the_families_asked_for(room):
 
 
 @pytest.mark.parametrize(
-    "name", ["raw_tubes", "thorny", "cut_grids", "stacks", "bottles", "ribbons"]
+    "name", ["raw_tubes", "thorny", "cut_grids", "stacks", "bottles", "ribbons", "parts"]
 )
 def test_a_seed_is_a_solid_torus_and_always_the_same(name):
     from families import families
