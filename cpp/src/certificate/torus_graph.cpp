@@ -22,19 +22,27 @@ struct FaceOnTorus {
   double chart_area = 0.0;  // of the straight triangle between the lifted corners
 };
 
+// A direction less than a right angle from all three, zero if there is none: the mean, or the
+// middle between two of them where these are far from the third.
+Vec2 middle_of(const std::array<Vec2, 3>& unit) {
+  for (const Vec2& middle : {Vec2(unit[0] + unit[1] + unit[2]), Vec2(unit[0] + unit[1]),
+                             Vec2(unit[1] + unit[2]), Vec2(unit[2] + unit[0])}) {
+    const auto near = [&](const Vec2& direction) { return middle.dot(direction) > 1e-9; };
+    if (std::all_of(unit.begin(), unit.end(), near)) return middle;
+  }
+  return Vec2::Zero();
+}
+
 FaceOnTorus examine(const std::array<Vec3, 3>& x, double R) {
   FaceOnTorus out;
   // All corners on one side of a plane through the axis, so u is an interval shorter than pi.
   std::array<Vec2, 3> flat, unit;
-  Vec2 middle = Vec2::Zero();
   for (int k = 0; k < 3; ++k) {
     flat[k] = x[k].head<2>();
     unit[k] = flat[k].normalized();
-    middle += unit[k];
   }
-  for (int k = 0; k < 3; ++k) {
-    if (!(middle.dot(unit[k]) > 1e-9)) return out;
-  }
+  const Vec2 middle = middle_of(unit);
+  if (middle.isZero(0.0)) return out;
   const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0];
   const Vec3 n = e1.cross(e2);
   const Vec2 n_flat = n.head<2>();

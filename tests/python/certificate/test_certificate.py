@@ -324,3 +324,30 @@ def test_report(solid):
     certificate = certify(solid, solid.V, TORUS)
     assert json.loads(json.dumps(certificate.to_dict()))["certified"] is True
     assert "image positive" in certificate.summary()
+
+
+def test_wide_faces_of_a_fat_torus_are_judged_as_their_points_say():
+    """Faces over up to 175 degrees of u: proven just where the normal looks outward all along."""
+    rng, R = np.random.default_rng(4), 1.05
+    seen = set()
+    for _ in range(4000):
+        wide = np.radians(rng.uniform(60.0, 175.0))
+        u = rng.uniform(0.0, 2.0 * np.pi) + wide * np.array([0.0, rng.uniform(0.0, 1.0), 1.0])
+        v = np.pi + rng.uniform(-1.0, 1.0, 3)
+        way = np.column_stack([np.cos(u), np.sin(u), 0.0 * u])
+        points = way * (R + np.cos(v))[:, None]
+        points[:, 2] = np.sin(v)
+        faces = np.array([[0, 1, 2] if rng.random() < 0.5 else [0, 2, 1]], np.int32)
+        a, b, c = points[faces[0]]
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal)
+        along = np.linspace(u[0], u[2], 2001)
+        circle = R * (normal[0] * np.cos(along) + normal[1] * np.sin(along))
+        outward = float((normal @ a - circle).min())
+        if abs(outward) < 1e-5:
+            continue
+        proven = not len(_core.certificate.torus_graph(points, faces, R).bad)
+        assert proven == (outward > 0.0)
+        middle = way.sum(axis=0)
+        seen.add((proven, bool((way @ middle > 0.0).all())))
+    assert seen == {(True, True), (True, False), (False, True), (False, False)}
