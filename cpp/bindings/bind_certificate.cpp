@@ -17,7 +17,8 @@ void bind(py::module_& m) {
   py::class_<TorusGraph>(m, "TorusGraph")
       .def_readonly("bad", &TorusGraph::bad)
       .def_readonly("winding", &TorusGraph::winding);
-  m.def("torus_graph", &torus_graph, points, faces, py::arg("R"), release_gil());
+  m.def("torus_graph", &torus_graph, points, faces, py::arg("R"), py::arg("strict") = false,
+        release_gil());
 }
 
 }  // namespace stretchmap::certificate

@@ -24,16 +24,17 @@ struct FaceOnTorus {
 
 // A direction less than a right angle from all three, zero if there is none: the mean, or the
 // middle between two of them where these are far from the third.
-Vec2 middle_of(const std::array<Vec2, 3>& unit) {
+Vec2 middle_of(const std::array<Vec2, 3>& unit, bool strict) {
   for (const Vec2& middle : {Vec2(unit[0] + unit[1] + unit[2]), Vec2(unit[0] + unit[1]),
                              Vec2(unit[1] + unit[2]), Vec2(unit[2] + unit[0])}) {
     const auto near = [&](const Vec2& direction) { return middle.dot(direction) > 1e-9; };
     if (std::all_of(unit.begin(), unit.end(), near)) return middle;
+    if (strict) break;
   }
   return Vec2::Zero();
 }
 
-FaceOnTorus examine(const std::array<Vec3, 3>& x, double R) {
+FaceOnTorus examine(const std::array<Vec3, 3>& x, double R, bool strict) {
   FaceOnTorus out;
   // All corners on one side of a plane through the axis, so u is an interval shorter than pi.
   std::array<Vec2, 3> flat, unit;
@@ -41,7 +42,7 @@ FaceOnTorus examine(const std::array<Vec3, 3>& x, double R) {
     flat[k] = x[k].head<2>();
     unit[k] = flat[k].normalized();
   }
-  const Vec2 middle = middle_of(unit);
+  const Vec2 middle = middle_of(unit, strict);
   if (middle.isZero(0.0)) return out;
   const Vec3 e1 = x[1] - x[0], e2 = x[2] - x[0];
   const Vec3 n = e1.cross(e2);
@@ -81,11 +82,11 @@ FaceOnTorus examine(const std::array<Vec3, 3>& x, double R) {
 
 }  // namespace
 
-TorusGraph torus_graph(const PointsRef& points, const FacesRef& faces, double R) {
+TorusGraph torus_graph(const PointsRef& points, const FacesRef& faces, double R, bool strict) {
   std::vector<FaceOnTorus> examined(static_cast<std::size_t>(faces.rows()));
   for_rows(static_cast<Index>(faces.rows()), kCostlyChunk, [&](Index f) {
-    examined[f] =
-        examine({points.row(faces(f, 0)), points.row(faces(f, 1)), points.row(faces(f, 2))}, R);
+    examined[f] = examine(
+        {points.row(faces(f, 0)), points.row(faces(f, 1)), points.row(faces(f, 2))}, R, strict);
   });
   std::vector<Index> bad;
   double area = 0.0;

@@ -217,8 +217,9 @@ class _BoundaryMaps:
         return turned(found, self.progress) if folded else found
 
     def _not_outward(self, found: AreaMap) -> int:
-        """Faces that do not look outward everywhere."""
-        return len(_core.certificate.torus_graph(found.image, self.surface.F, found.torus.R).bad)
+        """Faces that do not look outward everywhere, or reach far round the axis."""
+        F, R = self.surface.F, found.torus.R
+        return len(_core.certificate.torus_graph(found.image, F, R, strict=True).bad)
 
     def _chart(self, ratio: Ratio | float, shape: float = 0.0) -> AreaMap:
         if shape:

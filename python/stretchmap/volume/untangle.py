@@ -218,11 +218,14 @@ def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDA
 
 
 def folded_faces(model: SolidModel, x: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Boundary faces that do not look outward everywhere, and of which a vertex may glide."""
+    """Boundary faces that do not look outward everywhere, and of which a vertex may glide.
+
+    On a torus those that reach far round its axis, too: what unfolds them has better volumes.
+    """
     if model.torus is None:
         rows = model.gliding_faces
         return rows[~(model.gliding(model.faces[rows]).facing(x) > 0.0)]
-    folded = _core.certificate.torus_graph(x, model.faces, model.torus.R).bad
+    folded = _core.certificate.torus_graph(x, model.faces, model.torus.R, strict=True).bad
     return np.intersect1d(folded, model.gliding_faces)
 
 

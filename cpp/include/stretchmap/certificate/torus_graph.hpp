@@ -19,6 +19,9 @@ struct TorusGraph {
 };
 
 // faces outward. \pre R > 0.
-TorusGraph torus_graph(const PointsRef& points, const FacesRef& faces, double R);
+// strict: faces with a corner a right angle or more from the mean direction of all three are bad,
+// too. They are no folds, but maps that avoid them are better where there are few faces.
+TorusGraph torus_graph(const PointsRef& points, const FacesRef& faces, double R,
+                       bool strict = false);
 
 }  // namespace stretchmap::certificate
