@@ -40,13 +40,10 @@ def opened(solid: TetMesh) -> TetMesh:
 
 def _opened(solid: TetMesh, tet: int) -> TetMesh | None:
     """With the best of its edges split, if there is one."""
-    corners = solid.T[tet]
-    on_surface = {tuple(edge) for edge in solid.boundary_vertices[solid.surface.edges].tolist()}
-    splits = [
-        _split(solid, tet, edge)
-        for edge in corners[TET_EDGES]
-        if tuple(sorted(edge.tolist())) not in on_surface
-    ]
+    edges = np.sort(solid.T[tet][TET_EDGES], axis=1)
+    on_surface = np.sort(solid.boundary_vertices[solid.surface.edges], axis=1)
+    inside = ~(edges[:, None] == on_surface).all(axis=2).any(axis=1)
+    splits = [_split(solid, tet, edge) for edge in edges[inside]]
     worst, best = max(splits, key=lambda found: found[0], default=(0.0, None))
     return best if worst > 0.0 else None
 
