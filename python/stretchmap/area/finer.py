@@ -345,10 +345,13 @@ def mapped_finer(
         most = affordable - RINGS if with_rings else work.steps(n_faces, least=_LEAST_STEPS)
         most = min(most if last else min(most, ROUND_STEPS), steps.max_iter)
         work.begin(newton, n_faces)
+        asked = replace(steps, max_iter=most)
+        if finer.added.n_split:  # shapes count from there on, where steps end now
+            asked = replace(asked, tol=_GOOD * steps.tol, shape_budget=np.inf)
         records, converged, reason = finish_areas(
             newton,
             with_rings,
-            Steps(most, steps.tol, steps.shape_budget),
+            asked,
             progress,
             pace,
             work.late,
@@ -357,7 +360,7 @@ def mapped_finer(
         history += records
         finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
         measured = newton.measures()
-        if with_rings and worth_rings(measured, steps.tol):
+        if with_rings and worth_rings(measured, asked.tol):
             work.spend_on_rings(n_faces)
         _log.info("%d edges halved: face SD %.2e", finer.added.n_split, measured.face_std)
         before, now = error, measured.face_std if measured.flips == 0 else np.inf

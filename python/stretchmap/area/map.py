@@ -87,7 +87,8 @@ def area_map(
         Most Newton steps.
     tol : float
         Goal for the standard deviation of the face ratios; none is to be off by more than 10 times
-        that.
+        that. Twice as much where edges had to be halved: what is left takes most of the steps
+        there.
     shape_budget : float
         Once the face SD is below twice ``tol``, the Newton steps end where the mean angle
         distortion exceeds the least seen by this factor: on regular triangulations the last per
