@@ -246,6 +246,11 @@ class History:
     _clock: float = field(default_factory=time.perf_counter)
     _stage: str = ""
 
+    def right(self, std: float) -> bool:
+        """Whether no tet was inverted when last measured and the SD of the ratios was so small."""
+        last = self.records[-1] if self.records else None
+        return last is not None and last.flips == 0 and last.element_std <= std
+
     def add(
         self,
         stage: str,

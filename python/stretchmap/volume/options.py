@@ -143,7 +143,8 @@ class VolumeOptions(FillOptions):
         As in `area_map`.
     tol : float, optional
         Stop when a step lowers the energy by no more than this share: ``"vsem"``, default 1e-6, or
-        any stage of ``"certified"``, in place of ``frozen_tol`` and ``glide_tol``.
+        any stage of ``"certified"``, in place of ``frozen_tol`` and ``glide_tol``. Left out, the
+        latter also stops where the SD of the ratios is below 1e-4, as it soon is on tori.
     target_iter, shift_iter : int
         Most steps of each kind that equalize the volumes along u, v and s.
     marginal_tol : float

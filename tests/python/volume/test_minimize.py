@@ -40,6 +40,7 @@ def test_a_small_promise_after_a_large_one_that_was_not_kept_is_no_rest(promises
         options=options,
         newton=lambda x, glide: newton,
         targets=np.ones(1),
+        torus=None,
         T=np.zeros((1, 4), np.int32),
     )
     kept = []
@@ -67,6 +68,7 @@ def asked_of(volumes, alphas):
         options=FillOptions(glide_iter=len(alphas)),
         newton=lambda x, glide: newton,
         shares=np.array([0.125, 0.875]),
+        torus=None,
         T=np.zeros((2, 4), np.int32),
     )
     history = SimpleNamespace(budget=SimpleNamespace(spent=False), add=lambda *_, **__: None)
@@ -117,3 +119,16 @@ def test_growing_step_by_step_takes_fewer_steps_to_better_volumes(monkeypatch):
     monkeypatch.setattr(minimizing, "_EVEN", np.inf)
     steps_at_once, error_at_once = steps_and_error()
     assert steps < 0.85 * steps_at_once and error < 0.85 * error_at_once
+
+
+@pytest.mark.parametrize("n_tets", [40_000, 80_000])
+def test_volumes_that_are_right_take_no_more_steps(n_tets):
+    solid = sm.samples.solid_torus(n_tets)
+    found = sm.volume_map(solid)
+    assert found.converged and found.stop_reason == "volumes are right"
+    assert found.distortion.element_std < 1e-4
+    options = sm.VolumeOptions(tol=2e-3)
+    further = sm.volume_map(solid, options=options)
+    assert further.stop_reason != "volumes are right"
+    assert len(further.history) > len(found.history)
+    assert further.distortion.element_std < 0.5 * found.distortion.element_std
