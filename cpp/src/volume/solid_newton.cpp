@@ -103,10 +103,13 @@ bool SolidNewton::renew(const PointsRef& x, const EnergyWeights& w, bool keep) {
   }
   const Vec gradient = Eigen::Map<const Vec>(gradient_.data(), gradient_.size());
   if (keep && !new_targets_) {
-    const Vec change = gradient - last_gradient_;
-    const double curvature = change.dot(last_step_);
-    if (curvature > 1e-12 * change.norm() * last_step_.norm())
-      changes_.push_back({last_step_, change, 1.0 / curvature});
+    Change change{last_step_.cast<float>(), (gradient - last_gradient_).cast<float>(), 0.0};
+    const Eigen::VectorXf &step = change.step, &difference = change.gradient;
+    const double curvature = step.cast<double>().dot(difference.cast<double>());
+    if (curvature > 1e-12 * double(difference.norm()) * double(step.norm())) {
+      change.inverse = 1.0 / curvature;
+      changes_.push_back(std::move(change));
+    }
   }
   new_targets_ = false;
   last_gradient_ = gradient;
@@ -127,8 +130,8 @@ bool SolidNewton::descend(const NewtonOptions& options, const Poll& poll, Points
   Eigen::Map<Vec> flat(q.data(), q.size());
   std::vector<double> share(changes_.size());
   for (std::size_t k = changes_.size(); k-- > 0;) {
-    share[k] = changes_[k].inverse * changes_[k].step.dot(flat);
-    flat -= share[k] * changes_[k].gradient;
+    share[k] = changes_[k].inverse * changes_[k].step.cast<double>().dot(flat);
+    flat -= share[k] * changes_[k].gradient.cast<double>();
   }
   direction = Points::Zero(q.rows(), 3);
   linalg::SolveReport solved;
@@ -138,8 +141,10 @@ bool SolidNewton::descend(const NewtonOptions& options, const Poll& poll, Points
     return false;
   }
   Eigen::Map<Vec> d(direction.data(), direction.size());
-  for (std::size_t k = 0; k < changes_.size(); ++k)
-    d += (share[k] - changes_[k].inverse * changes_[k].gradient.dot(d)) * changes_[k].step;
+  for (std::size_t k = 0; k < changes_.size(); ++k) {
+    const double now = changes_[k].inverse * changes_[k].gradient.cast<double>().dot(d);
+    d += (share[k] - now) * changes_[k].step.cast<double>();
+  }
   report.cg_iterations += solved.iterations;
   report.negative_curvature = solved.negative_curvature;
   report.cg_residual = solved.residual.size() > 0 ? solved.residual.maxCoeff() : 0.0;
@@ -159,10 +164,9 @@ void SolidNewton::try_eased(Points& x, const Points& start, Points& direction,
   report.alpha = 1.0;
 }
 
-bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights& w,
+bool SolidNewton::search(Points& x, Points& direction, const EnergyWeights& w,
                          NewtonReport& report) {
   const Points start = x;
-  Points taken = direction;
   const double longest = w.epsilon > 0.0 ? 1.0 : energy_.longest_step(x, direction);
   Points trial;
   EnergyReport there;
@@ -178,10 +182,10 @@ bool SolidNewton::search(Points& x, const Points& direction, const EnergyWeights
     report.alpha = alpha;
     if (alpha == longest) try_double_step(x, start, direction, w, report);
   }
-  if (w.epsilon <= 0.0 && report.alpha < kHeldUp) try_held_back(x, start, taken, w, report);
-  if (w.face > 0.0 && report.alpha < kHeldUp) try_eased(x, start, taken, w, report);
+  if (w.epsilon <= 0.0 && report.alpha < kHeldUp) try_held_back(x, start, direction, w, report);
+  if (w.face > 0.0 && report.alpha < kHeldUp) try_eased(x, start, direction, w, report);
   if (report.alpha == 0.0) return false;
-  last_step_ = report.alpha * Eigen::Map<const Vec>(taken.data(), taken.size());
+  last_step_ = report.alpha * Eigen::Map<const Vec>(direction.data(), direction.size());
   return true;
 }
 

@@ -137,6 +137,7 @@ def solve(
         left = _untangle(run, glide=glide and not on_mesh)
         if left and _freed(run):
             left = 0
+    run.take(run.problem)  # without what untangling kept
     if left:
         reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")

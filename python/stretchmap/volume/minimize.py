@@ -87,23 +87,26 @@ class _Asked:
     """
 
     def __init__(self, model: SolidModel, first: NDArray[np.float64] | None) -> None:
-        ones = np.ones(len(model.T))
-        self._model, self._logs = model, np.log(ones if first is None else first)
-        self.even = first is None or self._uneven < _EVEN
-        self.volumes = ones if first is None or self.even else first
-
-    @property
-    def _uneven(self) -> float:
-        return float((self._model.shares * np.abs(self._logs)).sum())
+        self._model, self._logs = model, np.zeros(0)
+        self.even, self.volumes = True, np.ones(len(model.T))
+        if first is not None:
+            self._take(np.log(first), first)
 
     def follow(self, alpha: float) -> None:
         """After a step of length ``alpha`` from where these were asked for."""
         if 0.0 < alpha < _SERVED:
             return
-        self._logs *= _LEANER if alpha >= 1.0 else math.sqrt(_LEANER)
-        self.even = alpha == 0.0 or self._uneven < _EVEN
-        volumes = np.ones(len(self._logs)) if self.even else np.exp(self._logs)
-        self.volumes = volumes / (self._model.shares * volumes).sum()
+        logs = self._logs * (_LEANER if alpha >= 1.0 else math.sqrt(_LEANER))
+        volumes = np.exp(logs)
+        self._take(logs, volumes / (self._model.shares * volumes).sum(), stuck=alpha == 0.0)
+
+    def _take(
+        self, logs: NDArray[np.float64], volumes: NDArray[np.float64], *, stuck: bool = False
+    ) -> None:
+        """Ask for them, or for even ones where they nearly are."""
+        self.even = stuck or float((self._model.shares * np.abs(logs)).sum()) < _EVEN
+        self._logs = np.zeros(0) if self.even else logs
+        self.volumes = np.ones(len(logs)) if self.even else volumes
 
 
 @dataclass
@@ -175,6 +178,7 @@ def minimize(
     to_be_right = to_be_right and model.torus is not None and free == (1.0, 1.0)
     newton = model.newton(x, glide=glide)
     volumes = _Asked(model, asked if glide else None)
+    asked = None  # they take memory
     goals = volumes.volumes if glide else model.targets
     if not (glide and volumes.even):
         newton.set_targets(goals)
@@ -194,8 +198,8 @@ def minimize(
         )
         if free != (1.0, 1.0):
             ratios = _core.mesh.tet_volumes(x, model.T) / _core.mesh.tet_volumes(model.V, model.T)
-            asked = volumes.volumes if glide else model.targets
-            goals = asked * np.clip(ratios / asked, *free)
+            wanted = volumes.volumes if glide else model.targets
+            goals = wanted * np.clip(ratios / wanted, *free)
             newton.set_targets(goals)
         x, step = newton.step(x, weights, linear)
         if relaxation is not None and step.alpha < _SERVED:

@@ -94,7 +94,7 @@ class SolidModel:
         """Rest matrices (k, 9), of some tets or all; not kept, as the minimizer has its own."""
         return _core.volume.rest_matrices(self.V, self.T[tets], self.options.max_aspect)
 
-    @cached_property
+    @property
     def local_volumes(self) -> NDArray[np.float64]:
         """Volume each tet may be expected to get, relative to its source; 1 on the whole: (k,)."""
         if self.scale is None:
@@ -123,7 +123,7 @@ class SolidModel:
         weights = np.sqrt(self.shares * self.roomy_volumes / self.local_volumes)
         return np.asarray(weights / weights.sum())
 
-    @cached_property
+    @property
     def targets(self) -> NDArray[np.float64]:
         """Volume to ask of each tet behind a held boundary, relative to its share: (k,).
 

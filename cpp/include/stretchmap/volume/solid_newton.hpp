@@ -56,7 +56,7 @@ class SolidNewton {
                     const Poll& poll = {});
 
  private:
-  bool search(Points& x, const Points& direction, const EnergyWeights& w, NewtonReport& report);
+  bool search(Points& x, Points& direction, const EnergyWeights& w, NewtonReport& report);
   void try_double_step(Points& x, const Points& start, const Points& direction,
                        const EnergyWeights& w, NewtonReport& report) const;
   void try_held_back(Points& x, const Points& start, Points& direction, const EnergyWeights& w,
@@ -65,8 +65,9 @@ class SolidNewton {
   void try_eased(Points& x, const Points& start, Points& direction, const EnergyWeights& w,
                  NewtonReport& report) const;
 
+  // In single precision: it corrects a Hessian that is off by more.
   struct Change {
-    Vec step, gradient;
+    Eigen::VectorXf step, gradient;
     double inverse;  // 1 / (step . gradient)
   };
 
