@@ -26,9 +26,12 @@ Vec edge_sags(const mesh::SurfaceTopology& top, const SurfaceChart& chart, const
       const Eigen::Vector2d middle = 0.5 * (angle[k] + angle[next]);
       const Eigen::Vector3d over = torus.point(middle.x(), middle.y());
       const double sag = (over - 0.5 * (point[k] + point[next])).norm();
-      const Eigen::Vector3d along = point[next] - point[k];
+      // Along the torus: the ends of a long edge may be close to each other.
+      const Eigen::Vector2d scale(torus.R + torus.r * std::cos(middle.y()), torus.r);
+      const Eigen::Vector2d along = scale.cwiseProduct(angle[next] - angle[k]);
+      const Eigen::Vector2d third = scale.cwiseProduct(angle[(k + 2) % 3] - angle[k]);
       const double square = std::max(along.squaredNorm(), std::numeric_limits<double>::min());
-      const double foot = std::clamp((point[(k + 2) % 3] - point[k]).dot(along) / square, 0.0, 1.0);
+      const double foot = std::clamp(third.dot(along) / square, 0.0, 1.0);
       const double there = 4.0 * foot * (1.0 - foot);  // of the sag in the middle
       sags(f, k) = there * sag * along.norm() * total / (2.0 * areas(f));
     }

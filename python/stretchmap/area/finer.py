@@ -132,6 +132,13 @@ class Finer:
         """Of the vertices, on a torus with a tube of radius 1."""
         return Torus(self.ratio, 1.0).xi(*self.angles.T)
 
+    def lengths(self) -> NDArray[np.float64]:
+        """(e,) of the edges along the torus: many times the distance of their ends, some of them."""
+        i, j = self.level.surface.edges.T
+        du, dv = (self.angles[j] - self.angles[i] + TWO_PI * self.level.forms.T).T
+        middle = self.angles[i, 1] + 0.5 * dv
+        return np.asarray(np.hypot((self.ratio + np.cos(middle)) * du, dv))
+
     def sags(self) -> NDArray[np.float64]:
         """(e,) how far each edge sags where a face's third corner is, over the height of that.
 
@@ -147,7 +154,7 @@ class Finer:
     def halved(self, marked: NDArray[np.bool_]) -> Finer:
         """With those edges halved, in the chart, too: no face turns over there."""
         level, surface = self.level, self.level.surface
-        done = halve_edges(surface, marked, self.image)
+        done = halve_edges(surface, marked, self.lengths())
         shifts = np.stack([level.chart.shift_u, level.chart.shift_v], axis=-1)
         corners = self.angles[surface.F] + TWO_PI * shifts
         corners = np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)

@@ -42,8 +42,9 @@ class SurfaceRefinement:
     >>> import stretchmap as sm
     >>> from stretchmap.mesh.halved_faces import SurfaceRefinement, halve_edges
     >>> surface = sm.samples.torus_surface(24, 12)
-    >>> first = np.arange(len(surface.edges)) < 10
-    >>> finer = SurfaceRefinement.of(surface).after(halve_edges(surface, first, surface.V))
+    >>> lengths = np.ones(len(surface.edges))
+    >>> first = np.arange(len(lengths)) < 10
+    >>> finer = SurfaceRefinement.of(surface).after(halve_edges(surface, first, lengths))
     >>> finer.n_split >= 10, bool(np.allclose(finer.prolong(surface.V), finer.surface.V))
     (True, True)
     """
@@ -118,7 +119,7 @@ class HalvedFaces:
 
 
 def halve_edges(
-    surface: TriMesh, marked: NDArray[np.bool_], points: NDArray[np.float64]
+    surface: TriMesh, marked: NDArray[np.bool_], lengths: NDArray[np.float64]
 ) -> HalvedFaces:
     """Halve some edges of a closed surface, and the longest of every face that has one of them.
 
@@ -127,16 +128,15 @@ def halve_edges(
     surface : TriMesh
     marked : ndarray of bool, shape (e,)
         Of ``surface.edges``.
-    points : ndarray, shape (n, 3)
-        Where the vertices are to be seen to tell which edge or diagonal is longer.
+    lengths : ndarray, shape (e,)
+        By which one edge is longer than another, and the diagonal to its middle shorter.
     """
     edge = surface.topology.edge.reshape(-1, 3)
-    marked = _with_longest(surface, marked, points)
+    marked = _with_longest(surface, marked, lengths)
     ends = surface.edges[marked]
     number = np.full(len(surface.edges), -1, np.int32)
     number[marked] = surface.n_vertices + np.arange(len(ends), dtype=np.int32)
     ids = np.concatenate([surface.F, number[edge]], axis=1)  # corners, then midpoints
-    seen = np.concatenate([points, points[ends].mean(axis=1)])
     cut = marked[edge]
     count = cut.sum(axis=1)
     parents: list[NDArray[np.intp]] = []
@@ -153,11 +153,9 @@ def halve_edges(
     put(one, cut[one].argmax(axis=1), _ONE)
     turn = (~cut[two]).argmax(axis=1) + 1  # the edge left whole comes last
     put(two, turn, _CORNER)
-    first, second = (
-        np.linalg.norm(seen[ids[two, a]] - seen[ids[two, b]], axis=1)
-        for a, b in ((turn % 3, 3 + (1 + turn) % 3), (3 + turn % 3, (2 + turn) % 3))
-    )
-    for chosen, parts in zip((first < second, first >= second), _ACROSS, strict=True):
+    # Of two medians that to the longer side is the shorter.
+    first, second = (lengths[edge[two, side % 3]] for side in (turn, turn + 1))
+    for chosen, parts in zip((second > first, second <= first), _ACROSS, strict=True):
         put(two[chosen], turn[chosen], parts)
     put(three, np.zeros_like(three), _ALL)
     parent = np.concatenate(parents)
@@ -169,13 +167,11 @@ def halve_edges(
 
 
 def _with_longest(
-    surface: TriMesh, marked: NDArray[np.bool_], points: NDArray[np.float64]
+    surface: TriMesh, marked: NDArray[np.bool_], lengths: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """The edges marked, and the longest of every face that has a marked one (Rivara)."""
     edge = surface.topology.edge.reshape(-1, 3)
-    ends = points[surface.edges]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    longest = edge[np.arange(len(edge)), length[edge].argmax(axis=1)]
+    longest = edge[np.arange(len(edge)), lengths[edge].argmax(axis=1)]
     marked = marked.copy()
     while (missing := marked[edge].any(axis=1) & ~marked[longest]).any():
         marked[longest[missing]] = True
