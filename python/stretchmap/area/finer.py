@@ -133,7 +133,7 @@ class Finer:
         return Torus(self.ratio, 1.0).xi(*self.angles.T)
 
     def lengths(self) -> NDArray[np.float64]:
-        """(e,) of the edges along the torus: many times the distance of their ends, some of them."""
+        """(e,) of the edges along the torus, where their ends may be close to each other."""
         i, j = self.level.surface.edges.T
         du, dv = (self.angles[j] - self.angles[i] + TWO_PI * self.level.forms.T).T
         middle = self.angles[i, 1] + 0.5 * dv
