@@ -3,9 +3,9 @@
     python bench/speed.py --before FOLDER [--after FOLDER] [--json docs/data/speed.json] [--write]
     python bench/speed.py --draw docs/data/speed.json        # the table again, nothing measured
 
-Volume maps of ``--cases``: meshes by name, or tori of so many tets; area maps of ``--surfaces``:
-shaken tori of so many faces. Rows of a file that is there are kept, in their places, unless they
-are measured again.
+Volume maps of ``--cases``: meshes by name, or tori of so many tets, or, as ``bumpy:N``, bumpy ones;
+area maps of ``--surfaces``: shaken tori of so many faces. Rows of a file that is there are kept, in
+their places, unless they are measured again.
 
 FOLDER holds the built package ``stretchmap``: the ``python`` folder of a checkout built in place,
 or ``site-packages``. Every run is a process of its own, and the two builds take turns, so that both
@@ -27,6 +27,7 @@ from speed_page import HERE, METHODS, PACKAGE, parser_of, run_worker, save, show
 
 KEYS = ("case", "method", "threads", "build")  # of a row
 SURFACE = "area"  # the method of surfaces
+BUMPY = "bumpy"
 MESHES = ("petal_ring_synth_14506", "vertebra_L3_ssm_16420", "rocker_arm_25182", "kitten_21584")
 
 
@@ -35,6 +36,12 @@ def peak() -> int:
     import resource
 
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def generated(case: str) -> tuple[str, int]:
+    """Kind and size of a solid of the samples, "9000" or "bumpy:9000"; 0 of a mesh by name."""
+    kind, _, size = case.rpartition(":")
+    return (kind or "torus"), int(size) if size.isdigit() else 0
 
 
 def surface_worker(n_faces: int) -> dict[str, Any]:
@@ -77,7 +84,9 @@ def worker(job: dict[str, Any]) -> dict[str, Any]:
         with np.load(job["mesh"]) as arrays:
             solid = sm.TetMesh(arrays["V"], arrays["T"])
     else:
-        solid = sm.samples.solid_torus(int(job["mesh"]))
+        kind, n_tets = generated(job["mesh"])
+        make = sm.samples.bumpy_torus if kind == BUMPY else sm.samples.solid_torus
+        solid = make(n_tets)
     base, cpu, wall = peak(), time.process_time(), time.perf_counter()
     result = sm.volume_map(solid, **job["arguments"])
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
@@ -159,7 +168,8 @@ def table(data: dict[str, Any]) -> str:
             continue
         old, new = pair["before"], pair["after"]
         micro = [1e6 * row["processor_seconds"] / row["elements"] for row in (old, new)]
-        name = f"torus {int(case):,}" if case.isdigit() else case
+        kind, n_tets = generated(case)
+        name = f"{kind} {n_tets:,}" if n_tets else case
         lines.append(
             f"| {name} | {new['elements']:,} | {method} | {threads} "
             f"| {micro[0]:.1f} | {micro[1]:.1f} | {micro[1] / micro[0]:.2f} "
@@ -177,7 +187,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--before", type=Path, help="folder of the package to compare with")
     parser.add_argument("--after", type=Path, default=PACKAGE)
     parser.add_argument("--labels", nargs=2, default=("0.1.0", "this version"))
-    parser.add_argument("--cases", nargs="*", default=[*MESHES, "100000", "350000"])
+    parser.add_argument("--cases", nargs="*", default=[*MESHES, "100000", "350000", "bumpy:350000"])
     parser.add_argument("--surfaces", nargs="*", default=["25000", "100000"])
     parser.add_argument("--methods", nargs="+", default=["certified", "vsem"])
     parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])

@@ -57,7 +57,7 @@ def certified_map(
     starts = iter([start] if start is not None else [])
     if start is None:
         starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)
-    best, least, best_took = None, (True, 0, True, math.inf), 0.0
+    best, least, best_took, best_held = None, (True, 0, True, math.inf), 0.0, False
     vain, clock = 0.0, time.perf_counter()
     left_off = None  # the best one, where it made room
     before, latest = budget.left, 0.0  # processor seconds the last start took, but for comparing it
@@ -94,13 +94,14 @@ def certified_map(
         if best is None or rank < least:
             vain += best_took
             best, least, best_took = found, rank, took
+            best_held = len(outcome.problem.held) > 0
             again = dataclasses.replace(
                 begin, problem=outcome.problem, patience=1.0, hasty=False, resumed=True, others=0.0
             )
             left_off = again if begin.hasty else None
         else:
             vain += took
-        if best.certificate.certified and not least[2]:
+        if best.certificate.certified and not best_held:
             break
         if budget.left < _WORTH_A_START * budget.seconds:
             break
@@ -116,12 +117,12 @@ def certified_map(
 
 
 def _rank(outcome: Outcome, found: VolumeMap) -> tuple[bool, int, bool, float]:
-    """Least of what is certified, or else has fewest flipped tets; then where nothing is held, and
-    last of the lowest energy."""
+    """Least of what is certified, or else has fewest flipped tets; then of what has converged, with
+    nothing held, and last of the lowest energy."""
     minimized = [record.energy for record in outcome.history if record.stage in _MINIMIZED]
     return (
         not found.certificate.certified,
         found.distortion.flips or 0,
-        len(outcome.problem.held) > 0,
+        not outcome.converged or len(outcome.problem.held) > 0,
         minimized[-1] if minimized else math.inf,
     )

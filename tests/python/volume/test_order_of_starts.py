@@ -79,3 +79,36 @@ def order(monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int 
 )
 def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, expected) -> None:
     assert "".join(order(monkeypatch, stuck, left, kept)) == expected
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "best"),
+    [
+        # Held vertices and steps cut short are both unfinished: energy tells.
+        ([(2, False, 0.01), (0, False, 0.08)], 0),
+        ([(2, False, 0.08), (0, False, 0.01)], 1),
+        # At rest without any: better than lower energy with some.
+        ([(2, False, 0.01), (0, True, 0.02)], 1),
+    ],
+)
+def test_of_unfinished_maps_that_of_the_lowest_energy_is_best(monkeypatch, outcomes, best) -> None:
+    def starts(*_: Any, **__: Any) -> Any:
+        for held, converged, energy in outcomes:
+            problem = SimpleNamespace(held=range(held), converged=converged, energy=energy)
+            yield Start(SimpleNamespace(), problem, hasty=True)
+
+    def solve(problem: Any, *_: Any, **__: Any) -> Outcome:
+        record = SimpleNamespace(stage="glide", energy=problem.energy)
+        return Outcome(problem, (record,), problem.converged, str(problem.energy), {"start": 0.0})
+
+    monkeypatch.setattr(certified, "ranked_starts", starts)
+    monkeypatch.setattr(certified, "solve", solve)
+    energies = [energy for _, _, energy in outcomes]
+    monkeypatch.setattr(
+        certified,
+        "volume_result",
+        lambda o, *_: Found(0, {"which": energies.index(float(o.stop_reason))}),
+    )
+    solid = SimpleNamespace(n_tets=1000)
+    found = certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
+    assert found.seconds["which"] == best
