@@ -1,6 +1,8 @@
 from __future__ import annotations
 import typing
-__all__: list[str] = ['keep_to_one_thread', 'set_thread_count', 'shared_seconds', 'thread_count']
+__all__: list[str] = ['give_free_memory_back', 'keep_to_one_thread', 'set_thread_count', 'shared_seconds', 'thread_count']
+def give_free_memory_back() -> None:
+    ...
 def keep_to_one_thread() -> None:
     ...
 def set_thread_count(count: typing.SupportsInt | typing.SupportsIndex) -> None:

@@ -138,6 +138,7 @@ def solve(
         if left and _freed(run):
             left = 0
     run.take(run.problem)  # without what untangling kept
+    _core.base.give_free_memory_back()
     if left:
         reason = "the time limit was reached; " if run.history.budget.spent else ""
         return _outcome(run, False, f"{reason}{left} tets could not be untangled")
@@ -375,6 +376,7 @@ def _minimize(run: _Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidN
         run.x, converged, reason = done.x, done.converged, done.reason
         newton = None if glide else done.newton
         del done  # the next stage has a Hessian of its own, and memory need not hold both
+        _core.base.give_free_memory_back()
     if glide:
         with run.timed("glide"):
             first = o.volume_weight if run.problem.warm else goal
