@@ -257,7 +257,7 @@ def _volumes(
     F: NDArray[np.int32],
 ) -> None:
     volumes = _core.mesh.tet_volumes(image, T)
-    total = math.fsum(volumes)
+    total = float(volumes.sum())
     enclosed = _core.mesh.enclosed_volume(boundary_image, F)
     # Either sum is off by less than its number of terms in units of rounding of the bounding box.
     box = float(np.prod(np.ptp(image, axis=0)))
