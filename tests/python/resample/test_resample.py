@@ -107,7 +107,7 @@ def test_grids_of_very_long_solids_are_valid_and_do_not_swell(vertebra_map):
         )
         assert mesh.n_pulled_back_invalid > 0 and mesh.n_invalid == 0
         swollen.append(abs(mesh.volume / long.volume - 1.0))
-    assert np.mean(swollen) < 0.005 and max(swollen) < 0.015
+    assert np.mean(swollen) < 0.005 and max(swollen) < 0.02
 
 
 @pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (60, 3, 2)])
