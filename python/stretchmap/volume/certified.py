@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 from ..base.budget import Budget
 from ..base.progress import Progress
+from ..errors import SolverError
 from ..mesh.meshes import TetMesh
 from .engine import solve
 from .options import VolumeOptions
@@ -27,6 +28,10 @@ _WORTH_A_START = 0.1  # share of the time; with less left no further one is made
 # Tets stuck at most, and share of the time left, where a start that made room is gone on with
 # before another follows: nearly there, it may take much of the time yet.
 _NEARLY, _LATE = 30, 0.35
+# Mean abs(ratio - 1) from which on another torus is tried, so many times thinner, if so many times
+# the time the last start took is left: where areas of the boundary fit best, what few edges round a
+# handle or a limb leave room for can be far less than what belongs there.
+_POOR, _THINNER, _SPARE = 0.1, 2.0, 0.8
 
 
 def certified_map(
@@ -73,20 +78,25 @@ def certified_map(
                 begin, left_off = left_off, None
                 yield begin
 
-    for begin in in_turn():
+    def led_to(begin: Start, *, hasty: bool) -> tuple[Outcome, VolumeMap]:
         outcome = solve(
             begin.problem,
             options,
             glide=glide,
             budget=budget,
             patience=begin.patience,
-            hasty=begin.hasty,
+            hasty=hasty,
             resumed=begin.resumed,
             progress=progress,
         )
         seconds = {**outcome.seconds, "start": begin.seconds + outcome.seconds["start"]}
         outcome = dataclasses.replace(outcome, seconds=seconds)
-        found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
+        return outcome, volume_result(
+            outcome, "certified", "glide" if glide else "frozen", begin.map
+        )
+
+    for begin in in_turn():
+        outcome, found = led_to(begin, hasty=begin.hasty)
         clock, took = time.perf_counter(), time.perf_counter() - clock
         vain += begin.others
         before, latest = budget.left, before - budget.left - begin.others
@@ -111,9 +121,41 @@ def certified_map(
         why = held if found.certificate.certified else f"not certified ({best.certificate.reason})"
         _log.info("%s: once more from another start", why)
     assert best is not None
+    while (
+        start is None and glide and options.ratio is None and least[:3] == (False, 0, False)
+        and best.distortion.element_error_mean > _POOR and budget.left > _SPARE * latest
+    ):  # fmt: skip
+        thinner = _thinner(solid, options, best, budget, progress)
+        if thinner is None:
+            break
+        _log.info("volumes are kept badly: once more on a thinner torus")
+        outcome, found = led_to(thinner, hasty=False)
+        clock, took = time.perf_counter(), time.perf_counter() - clock
+        before, latest = budget.left, before - budget.left
+        rank = _rank(outcome, found)
+        if rank >= least:
+            vain += took
+            break
+        vain += best_took
+        best, least, best_took = found, rank, took
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
+
+
+def _thinner(
+    solid: TetMesh,
+    options: VolumeOptions,
+    found: VolumeMap,
+    budget: Budget,
+    progress: Progress | None,
+) -> Start | None:
+    """A start on a thinner torus than that of a map, if there is one."""
+    there = dataclasses.replace(options, ratio=_THINNER * found.torus.ratio)
+    try:
+        return next(ranked_starts(solid, there, budget, glide=True, progress=progress), None)
+    except SolverError:
+        return None
 
 
 def _rank(outcome: Outcome, found: VolumeMap) -> tuple[bool, int, bool, float]:

@@ -138,7 +138,7 @@ class VolumeOptions(FillOptions):
         measures how far a ratio is outside.
     ratio : "conformal", "search" or float, optional
         R / r of the torus, as in `area_map`. Default: the conformal one for ``"vsem"``, a search
-        for ``"certified"``.
+        for ``"certified"``, which also tries thinner tori where volumes are kept badly on that one.
     phase : float, optional
         As in `area_map`.
     tol : float, optional

@@ -20,10 +20,12 @@ class Found:
 
     flips: int
     seconds: dict[str, float] = field(default_factory=dict)
+    mean: float = 0.0  # of the tets' errors
+    torus: Any = None
 
     @property
     def distortion(self) -> Any:
-        return SimpleNamespace(flips=self.flips)
+        return SimpleNamespace(flips=self.flips, element_error_mean=self.mean)
 
     @property
     def certificate(self) -> Any:
@@ -112,3 +114,46 @@ def test_of_unfinished_maps_that_of_the_lowest_energy_is_best(monkeypatch, outco
     solid = SimpleNamespace(n_tets=1000)
     found = certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
     assert found.seconds["which"] == best
+
+
+@pytest.mark.parametrize(
+    ("means", "left", "tried", "best"),
+    [
+        ((0.05,), 0.9, (), 0),
+        ((0.3, 0.2, 0.05), 0.9, (4.0, 8.0), 2),  # until volumes are kept well enough,
+        ((0.3, 0.2, 0.25), 0.9, (4.0, 8.0), 1),  # or a thinner torus keeps them less,
+        ((0.3, 0.2), 0.3, (), 0),  # or time is short
+    ],
+)
+def test_where_volumes_are_kept_badly_thinner_tori_are_tried(
+    monkeypatch, means, left, tried, best
+) -> None:
+    budget, ratios = SimpleNamespace(seconds=1.0, left=1.0), []
+    queue = iter(means)
+
+    def starts(_: Any, options: VolumeOptions, *__: Any, **___: Any) -> Any:
+        ratios.append(options.ratio)
+        yield Start(SimpleNamespace(), SimpleNamespace(held=(), ratio=options.ratio or 2.0))
+
+    def solve(problem: Any, *_: Any, **__: Any) -> Outcome:
+        budget.left *= left
+        mean = next(queue)
+        record = SimpleNamespace(stage="glide", energy=mean**2)
+        return Outcome(problem, (record,), True, str(mean), {"start": 0.0})
+
+    def result(outcome: Any, *_: Any) -> Found:
+        torus = SimpleNamespace(ratio=outcome.problem.ratio)
+        return Found(0, {}, float(outcome.stop_reason), torus)
+
+    monkeypatch.setattr(certified.Budget, "of", lambda *_: budget)
+    monkeypatch.setattr(certified, "ranked_starts", starts)
+    monkeypatch.setattr(certified, "solve", solve)
+    monkeypatch.setattr(certified, "volume_result", result)
+    solid = SimpleNamespace(n_tets=1000)
+    found = certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
+    assert found.mean == means[best] and tuple(ratios[1:]) == tried
+    ratios.clear()
+    queue = iter(means)
+    budget.left = 1.0
+    certified.certified_map(solid, VolumeOptions(ratio=2.0), None, glide=True, progress=None)
+    assert ratios == [2.0]
