@@ -201,18 +201,24 @@ def test_steps_that_end_nowhere_early_are_solved_once() -> None:
     assert [newton.step(weights).step > 0.5 for _ in range(3)] == [True] * 3 and newton.solves == 3
 
 
-@pytest.mark.parametrize("seed", [3, 4, 5, 6])
-def test_faces_left_inward_are_turned_where_areas_are_nearly_right(seed: int) -> None:
-    start = Finer.wrapped(*eased(small_handle(seed, 3.6))).fitted(3.0)
-    assert start is not None
-    newton = start.newton()
-    _, pace = approach_areas(newton, 10, None)
-    assert newton.measures().flips > 0 and newton.measures().face_std < 0.1
-    other = start.level.newton(newton.angles, start.ratio)
-    unfold_faces(newton, 20, None, pace)
-    assert newton.measures().flips == 0 and newton.measures().face_std < 0.2
-    unfold_faces(other, 20, None)  # shapes weigh as much as areas: these are lost
-    assert other.measures().face_std > 2.0 * newton.measures().face_std
+def test_faces_left_inward_are_turned_where_areas_are_nearly_right() -> None:
+    """Edges still sag too much here; where they are halved, no face is left inward."""
+    by_pace, without, work = [], [], Work(1, np.inf, 40)
+    for seed in range(8):
+        start = Finer.wrapped(*eased(small_handle(seed, 3.6))).fitted(3.0)
+        assert start is not None
+        newton = start.newton()
+        _, pace = approach_areas(newton, 10, None)
+        assert newton.measures().flips > 0 and newton.measures().face_std < 0.1
+        other = start.level.newton(newton.angles, start.ratio)
+        unfold_faces(newton, 20, None, pace)
+        unfold_faces(other, 20, None)  # shapes weigh as much as areas: these are lost
+        assert newton.measures().flips == other.measures().flips == 0
+        by_pace.append(newton.measures().face_std)
+        without.append(other.measures().face_std)
+        near, _, _ = start.approached(None, work)
+        assert near.newton().least_facing() > 0.0 and near.newton().measures().face_std < 0.12
+    assert np.mean(by_pace) < 0.65 * np.mean(without)
 
 
 @pytest.mark.parametrize("turns", [9, 11, -8])
@@ -333,8 +339,12 @@ def test_charts_are_eased_where_halving_takes_too_many_faces(seed: int) -> None:
     assert start_of(surface).fitted(1.0) is None
     plain, eased = sm.area_map(surface, refine=False), sm.area_map(surface)
     assert eased.certificate.certified and eased.refinement is not None
-    # 0.01 where there is time enough.
-    assert eased.distortion.element_std < plain.distortion.element_std / 9.0
+    # 0.01 where there is time enough; and what does not reach it says so.
+    found = eased.distortion
+    assert found.element_std < plain.distortion.element_std / 9.0
+    worst = max(found.ratio_max - 1.0, 1.0 - found.ratio_min)
+    assert eased.converged == (found.element_std <= 0.01 and worst <= 0.1)
+    assert eased.converged or "face SD" in eased.stop_reason
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -387,6 +397,7 @@ def test_less_curvature_is_modeled_after_long_steps(seed: int) -> None:
 
 def test_rings_are_made_exact_only_where_faces_are_good() -> None:
     surface = small_handle(0)
+    # Edges are halved there, so that faces may be off by twice as much.
     far, good = sm.area_map(surface, tol=1e-4), sm.area_map(surface, tol=0.05)
     assert far.distortion.element_std > 2e-4
     assert good.distortion.element_std <= 0.05 and good.distortion.ring_std < 1e-9
