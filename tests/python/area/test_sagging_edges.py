@@ -3,39 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import stretchmap as sm
+from small_handles import eased, inward_faces, small_handle, start_of
 from stretchmap import TriMesh, _core
-from stretchmap.area import finer, finest, finish
+from stretchmap.area import finest, finish
 from stretchmap.area.coarse import Level
-from stretchmap.area.finer import Finer, goal, mapped_finer
-from stretchmap.area.finish import Pace, Steps, approach_areas, finish_areas, unfold_faces
-from stretchmap.area.map import equal_areas
+from stretchmap.area.finer import Finer, goal
+from stretchmap.area.finish import approach_areas, unfold_faces
 from stretchmap.area.route import Made
-from stretchmap.area.search import search_phase
 from stretchmap.area.work import Work
-from stretchmap.base.budget import Budget
 from stretchmap.base.torus import TWO_PI
 from stretchmap.mesh.halved_faces import halve_edges
-
-
-def small_handle(seed: int, far: float = 3.6) -> TriMesh:
-    """A torus turned inside out about a point close to it: a big body with a small hole."""
-    rng = np.random.default_rng(seed)
-    mesh = sm.samples.torus_surface(40, 28, 2.0, 1.0)
-    away = mesh.V - [far, *rng.uniform(-0.2, 0.2, size=2)]
-    return TriMesh(away / (away**2).sum(axis=1)[:, None], mesh.F, orient=True)
-
-
-def start_of(surface: TriMesh) -> Finer:
-    chart = sm.area_map(surface, finish="none", keep_best=True)
-    level = Level.of(surface, chart.angles / TWO_PI, chart.forms, chart.ratio)
-    return Finer.of(level, np.array(chart.angles), chart.ratio)
 
 
 @pytest.mark.parametrize(("seed", "far"), [(0, 3.8), (2, 4.0)])
@@ -112,25 +95,12 @@ def slender(finer: Finer) -> np.ndarray:
     return lengths**2 / _core.area.turn_areas(finer.level.chart, turns)
 
 
-def inward_faces(finer: Finer) -> int:
-    faces = finer.level.chart.faces
-    return len(_core.certificate.torus_graph(finer.image, faces, finer.ratio).bad)
-
-
 def chart_shares(finer: Finer) -> np.ndarray:
     """Areas of the faces in the chart of equal area, over those of the source."""
     turns = np.ascontiguousarray(finer.angles / TWO_PI)
     density = 1.0 + np.cos(finer.angles[:, 1])[finer.level.surface.F].mean(axis=1) / finer.ratio
     areas = finer.level.surface.face_areas
     return density * _core.area.turn_areas(finer.level.chart, turns) / areas * areas.sum()
-
-
-def eased(surface: TriMesh) -> tuple[Level, np.ndarray, float, float]:
-    """A level with turns eased towards shapes, phase and ratio."""
-    equal = equal_areas(surface, sm.conformal_map(surface), None)
-    turns, _ = equal.eased(0.01, equal.balanced(0.0)[0])
-    phase, ratio, _ = search_phase(surface, turns, equal.level.aspect, None, "conformal")
-    return equal.level, turns, phase, ratio
 
 
 def test_long_edges_of_needles_may_lie_deep_below_the_torus() -> None:
@@ -203,7 +173,7 @@ def test_steps_that_end_nowhere_early_are_solved_once() -> None:
 
 def test_faces_left_inward_are_turned_where_areas_are_nearly_right() -> None:
     """Edges still sag too much here; where they are halved, no face is left inward."""
-    by_pace, without, work = [], [], Work(1, np.inf, 40)
+    by_pace, without, work = [], [], Work(1, 1e12, 40)
     for seed in range(8):
         start = Finer.wrapped(*eased(small_handle(seed, 3.6))).fitted(3.0)
         assert start is not None
@@ -248,53 +218,6 @@ def test_edges_whose_ends_meet_again_are_long(turns: int) -> None:
     assert slender(fitted).max() < 3.0 * slender(sheared).max()
 
 
-def test_work_is_left_for_the_surface_as_it_is() -> None:
-    work = Work.of(sm.samples.torus_surface(100, 80), Budget(np.inf), refine=True)
-    most = work.steps()
-    work.reserved = 0.25
-    assert 0.7 * most < work.steps() < 0.8 * most
-    work.spend(work.steps())
-    assert work.steps() == 0
-    work.reserved = 0.0
-    assert work.steps() >= most // 4
-
-
-def test_steps_end_when_it_is_late() -> None:
-    surface = sm.samples.bumpy_torus(1000).surface
-    start = start_of(surface)
-    for late, most in ((lambda: True, 1), (lambda: False, 6)):
-        steps = Steps(5, 1e-12, np.inf)
-        records, _, reason = finish_areas(start.newton(), False, steps, None, None, late)
-        assert len(records) == most and "most steps done" in reason
-    work = Work.of(surface, Budget(10.0), refine=True)
-    assert not work.late() and not work.hurried
-    work.clock = Budget(0.0)
-    assert Work.of(surface, Budget(np.inf), refine=True).late() is False
-    equal = equal_areas(surface, sm.conformal_map(surface), None, Budget(0.0))
-    assert len(equal.balanced(0.0)[1]) == 0
-
-
-def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
-    rough = start_of(small_handle(1, 3.8))
-    start = rough.halved(np.arange(len(rough.sags())) == 0)
-    assert inward_faces(start) > 0
-    monkeypatch.setattr(Finer, "approached", lambda self, *_: (self, Pace(), []))
-    taken = []
-
-    def unfold(newton, steps, progress, pace):
-        taken.append(steps)
-        return []
-
-    monkeypatch.setattr(finer, "unfold_faces", unfold)
-    made = Made(start.angles, 0.0, start.ratio, [])
-    for many, times in ((0, 1), (10**6, 2)):
-        taken.clear()
-        monkeypatch.setattr(finer, "MANY_FOLDED", many)
-        work = Work(start.level.surface.n_faces, 1e9, 40, reserved=0.25)
-        assert mapped_finer(start, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work) is None
-        assert len(taken) == times and work.reserved == 0.25
-
-
 def test_a_chart_lost_in_rounding_is_passed_over(monkeypatch) -> None:
     """Where the surface is too coarse and no finer one serves, the next weight of shape follows."""
     surface = sm.samples.bumpy_torus(1000).surface
@@ -315,22 +238,6 @@ def test_a_chart_lost_in_rounding_is_passed_over(monkeypatch) -> None:
     weights.clear()
     with pytest.raises(sm.errors.SolverError, match="lost"):
         sm.area_map(surface, keep_best=True)
-
-
-def test_solves_beyond_one_a_step_are_counted() -> None:
-    start = Finer.wrapped(*eased(small_handle(0, 3.4))).fitted(3.0)
-    assert start is not None
-    newton, n_faces = start.newton(), start.level.surface.n_faces
-    left = []
-    for solved in (False, True):
-        work = Work(n_faces, 1e9, 40)
-        work.begin(newton, n_faces)
-        if solved:
-            newton.step(_core.area.SurfaceWeights(shape=0.05, chart=1.0))
-            assert newton.solves > 1
-        work.spend(1, n_faces)
-        left.append(work.left)
-    assert left[1] < left[0]
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -411,74 +318,6 @@ def test_edges_halved_let_areas_be_off_by_twice_the_tolerance(seed: int) -> None
         found = sm.area_map(surface, tol=tol)
         assert found.refinement is not None and found.converged
         assert tol < found.distortion.element_std <= 2.0 * tol
-
-
-def test_steps_are_counted_by_their_faces() -> None:
-    surface = sm.samples.torus_surface(100, 80)
-    work = Work.of(surface, Budget(np.inf), refine=True)
-    assert (work.n_faces, work.most) == (16_000, 40)
-    most = work.steps()
-    work.spend(10)
-    assert work.steps() == most - 10
-    work.spend(10, 32_000)  # twice the faces, and more than twice the work each
-    assert most - 40 < work.steps() < most - 30
-    assert work.steps(64_000) < work.steps() / 4
-    left = work.steps()
-    work.spend_in_chart(10)
-    assert left - 10 < work.steps() < left
-    work.spend(600)
-    assert work.steps() == 0 and work.steps(least=10) == 10 and not work.hurried
-    small = sm.samples.torus_surface()
-    unrefined = Work.of(small, Budget(np.inf), refine=False)
-    assert unrefined.most == unrefined.steps() > most
-
-
-def test_work_counts_what_elimination_takes() -> None:
-    long, square = sm.samples.torus_surface(640, 10), sm.samples.torus_surface(80, 80)
-    steps = []
-    for surface in (long, square):
-        start = start_of(surface)
-        newton, work = start.newton(), Work.of(surface, Budget(np.inf), refine=True)
-        work.begin(newton, surface.n_faces)
-        steps.append(work.steps())
-    assert steps[0] > 1.1 * steps[1]  # thin separators
-
-
-def test_steps_end_with_the_time_there_is() -> None:
-    surface = sm.samples.torus_surface(100, 80)
-    newton = start_of(surface).newton()
-    newton.flops()
-    work = Work.of(surface, Budget(0.4), refine=True)
-    work.begin(newton, surface.n_faces)
-    most = work.steps()
-    end = time.process_time() + 0.1
-    while time.process_time() < end:
-        pass
-    work.spend(5)
-    assert work.steps() < 0.2 * most and work.hurried  # five took a tenth of a second
-    while time.process_time() < end + 0.3:
-        pass
-    assert work.steps(least=10) == 0
-
-
-def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> None:
-    start = start_of(sm.samples.bumpy_torus(1000).surface)
-    where_off, asked = Finer.where_off, []
-
-    def once(self: Finer, tol: float) -> Finer | None:
-        asked.append(tol)
-        return where_off(self, tol) if len(asked) == 1 else None
-
-    monkeypatch.setattr(Finer, "where_off", once)
-    monkeypatch.setattr(finer, "ROUND_STEPS", 3)
-    made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
-    n_faces = start.level.surface.n_faces
-    work = Work(n_faces, 100.0 * n_faces, 40)  # less than brings the energy to rest
-    found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
-    assert found is not None and len(asked) >= 2 and found[1].added.n_split
-    assert [record.iteration for record in found[0].history].count(0) == 2
-    # All but a share kept for rings, which did not become exact here.
-    assert work.steps(found[1].level.surface.n_faces) <= 1
 
 
 def test_slivers_are_asked_for_less() -> None:

@@ -1,0 +1,149 @@
+"""How many steps an area map takes: work, and time where it is short."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+import stretchmap as sm
+from small_handles import eased, inward_faces, small_handle, start_of
+from stretchmap import _core
+from stretchmap.area import finer
+from stretchmap.area.finer import Finer, mapped_finer
+from stretchmap.area.finish import Pace, Steps, finish_areas
+from stretchmap.area.map import equal_areas
+from stretchmap.area.route import Made
+from stretchmap.area.work import Work
+from stretchmap.base.budget import Budget
+
+
+def test_work_is_left_for_the_surface_as_it_is() -> None:
+    work = Work.of(sm.samples.torus_surface(100, 80), Budget(np.inf), refine=True)
+    most = work.steps()
+    work.reserved = 0.25
+    assert 0.7 * most < work.steps() < 0.8 * most
+    work.spend(work.steps())
+    assert work.steps() == 0
+    work.reserved = 0.0
+    assert work.steps() >= most // 4
+
+
+def test_steps_end_when_it_is_late() -> None:
+    surface = sm.samples.bumpy_torus(1000).surface
+    start = start_of(surface)
+    for late, most in ((lambda: True, 1), (lambda: False, 6)):
+        steps = Steps(5, 1e-12, np.inf)
+        records, _, reason = finish_areas(start.newton(), False, steps, None, None, late)
+        assert len(records) == most and "most steps done" in reason
+    work = Work.of(surface, Budget(10.0), refine=True)
+    assert not work.late() and not work.hurried
+    work.clock = Budget(0.0)
+    assert Work.of(surface, Budget(np.inf), refine=True).late() is False
+    equal = equal_areas(surface, sm.conformal_map(surface), None, Budget(0.0))
+    assert len(equal.balanced(0.0)[1]) == 0
+
+
+def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
+    rough = start_of(small_handle(1, 3.8))
+    start = rough.halved(np.arange(len(rough.sags())) == 0)
+    assert inward_faces(start) > 0
+    monkeypatch.setattr(Finer, "approached", lambda self, *_: (self, Pace(), []))
+    taken = []
+
+    def unfold(newton, steps, progress, pace):
+        taken.append(steps)
+        return []
+
+    monkeypatch.setattr(finer, "unfold_faces", unfold)
+    made = Made(start.angles, 0.0, start.ratio, [])
+    for many, times in ((0, 1), (10**6, 2)):
+        taken.clear()
+        monkeypatch.setattr(finer, "MANY_FOLDED", many)
+        work = Work(start.level.surface.n_faces, 1e9, 40, reserved=0.25)
+        assert mapped_finer(start, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work) is None
+        assert len(taken) == times and work.reserved == 0.25
+
+
+def test_solves_beyond_one_a_step_are_counted() -> None:
+    start = Finer.wrapped(*eased(small_handle(0, 3.4))).fitted(3.0)
+    assert start is not None
+    newton, n_faces = start.newton(), start.level.surface.n_faces
+    left = []
+    for solved in (False, True):
+        work = Work(n_faces, 1e9, 40)
+        work.begin(newton, n_faces)
+        if solved:
+            newton.step(_core.area.SurfaceWeights(shape=0.05, chart=1.0))
+            assert newton.solves > 1
+        work.spend(1, n_faces)
+        left.append(work.left)
+    assert left[1] < left[0]
+
+
+def test_steps_are_counted_by_their_faces() -> None:
+    surface = sm.samples.torus_surface(100, 80)
+    work = Work.of(surface, Budget(np.inf), refine=True)
+    assert (work.n_faces, work.most) == (16_000, 40)
+    most = work.steps()
+    work.spend(10)
+    assert work.steps() == most - 10
+    work.spend(10, 32_000)  # twice the faces, and more than twice the work each
+    assert most - 40 < work.steps() < most - 30
+    assert work.steps(64_000) < work.steps() / 4
+    left = work.steps()
+    work.spend_in_chart(10)
+    assert left - 10 < work.steps() < left
+    work.spend(600)
+    assert work.steps() == 0 and work.steps(least=10) == 10 and not work.hurried
+    small = sm.samples.torus_surface()
+    unrefined = Work.of(small, Budget(np.inf), refine=False)
+    assert unrefined.most == unrefined.steps() > most
+
+
+def test_work_counts_what_elimination_takes() -> None:
+    long, square = sm.samples.torus_surface(640, 10), sm.samples.torus_surface(80, 80)
+    steps = []
+    for surface in (long, square):
+        start = start_of(surface)
+        newton, work = start.newton(), Work.of(surface, Budget(np.inf), refine=True)
+        work.begin(newton, surface.n_faces)
+        steps.append(work.steps())
+    assert steps[0] > 1.1 * steps[1]  # thin separators
+
+
+def test_steps_end_with_the_time_there_is() -> None:
+    surface = sm.samples.torus_surface(100, 80)
+    newton = start_of(surface).newton()
+    newton.flops()
+    work = Work.of(surface, Budget(0.4), refine=True)
+    work.begin(newton, surface.n_faces)
+    most = work.steps()
+    end = time.process_time() + 0.1
+    while time.process_time() < end:
+        pass
+    work.spend(5)
+    assert work.steps() < 0.2 * most and work.hurried  # five took a tenth of a second
+    while time.process_time() < end + 0.3:
+        pass
+    assert work.steps(least=10) == 0
+
+
+def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> None:
+    start = start_of(sm.samples.bumpy_torus(1000).surface)
+    where_off, asked = Finer.where_off, []
+
+    def once(self: Finer, tol: float) -> Finer | None:
+        asked.append(tol)
+        return where_off(self, tol) if len(asked) == 1 else None
+
+    monkeypatch.setattr(Finer, "where_off", once)
+    monkeypatch.setattr(finer, "ROUND_STEPS", 3)
+    made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
+    n_faces = start.level.surface.n_faces
+    work = Work(n_faces, 100.0 * n_faces, 40)  # less than brings the energy to rest
+    found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
+    assert found is not None and len(asked) >= 2 and found[1].added.n_split
+    assert [record.iteration for record in found[0].history].count(0) == 2
+    # All but a share kept for rings, which did not become exact here.
+    assert work.steps(found[1].level.surface.n_faces) <= 1
