@@ -32,6 +32,7 @@ _NEARLY, _LATE = 30, 0.35
 # the time the last start took is left: where areas of the boundary fit best, what few edges round a
 # handle or a limb leave room for can be far less than what belongs there.
 _POOR, _THINNER, _SPARE = 0.1, 2.0, 0.8
+_UNFINISHED = 2.0  # times as much counts the energy of a map with held vertices, or cut short
 
 
 def certified_map(
@@ -46,7 +47,9 @@ def certified_map(
 
     Where folded faces had to be held for that, the others are tried in the time left. A start in
     which tets stay stuck makes room for the next one; if none serves, or no more time is left than
-    the last one took, or two thirds are spent and few are stuck, the best is gone on with.
+    the last one took, or two thirds are spent and few are stuck, the best is gone on with. A map
+    that keeps volumes badly is made again on thinner and thinner tori, while that helps and time
+    lasts.
 
     Parameters
     ----------
@@ -62,7 +65,7 @@ def certified_map(
     starts = iter([start] if start is not None else [])
     if start is None:
         starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)
-    best, least, best_took, best_held = None, (True, 0, True, math.inf), 0.0, False
+    best, least, best_took = None, (True, 0, math.inf, True), 0.0
     vain, clock = 0.0, time.perf_counter()
     left_off = None  # the best one, where it made room
     before, latest = budget.left, 0.0  # processor seconds the last start took, but for comparing it
@@ -72,47 +75,52 @@ def certified_map(
         for another in itertools.chain(starts, [None]):
             if another is not None:
                 yield another
+            while best is not None and _done(least):
+                thinner = _thinner(solid, options, best, budget, progress)
+                if thinner is None:
+                    return
+                yield thinner
             nearly = 0 < least[1] <= _NEARLY and budget.left < _LATE * budget.seconds
             late = nearly or budget.left < latest
             if left_off is not None and (another is None or late):
                 begin, left_off = left_off, None
                 yield begin
 
-    def led_to(begin: Start, *, hasty: bool) -> tuple[Outcome, VolumeMap]:
+    for begin in in_turn():
         outcome = solve(
             begin.problem,
             options,
             glide=glide,
             budget=budget,
             patience=begin.patience,
-            hasty=hasty,
+            hasty=begin.hasty,
             resumed=begin.resumed,
             progress=progress,
         )
         seconds = {**outcome.seconds, "start": begin.seconds + outcome.seconds["start"]}
         outcome = dataclasses.replace(outcome, seconds=seconds)
-        return outcome, volume_result(
-            outcome, "certified", "glide" if glide else "frozen", begin.map
-        )
-
-    for begin in in_turn():
-        outcome, found = led_to(begin, hasty=begin.hasty)
+        found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
         clock, took = time.perf_counter(), time.perf_counter() - clock
         vain += begin.others
         before, latest = budget.left, before - budget.left - begin.others
         rank = _rank(outcome, found)
-        if best is None or rank < least:
+        gained = best is None or rank < least
+        if best is None or gained:
             vain += best_took
             best, least, best_took = found, rank, took
-            best_held = len(outcome.problem.held) > 0
             again = dataclasses.replace(
                 begin, problem=outcome.problem, patience=1.0, hasty=False, resumed=True, others=0.0
             )
             left_off = again if begin.hasty else None
         else:
             vain += took
-        if best.certificate.certified and not best_held:
-            break
+        if _done(least):
+            free = start is None and glide and options.ratio is None and outcome.converged
+            poor = best.distortion.element_error_mean > _POOR
+            if not (gained and free and poor and budget.left > _SPARE * latest):
+                break
+            _log.info("volumes are kept badly: once more on a thinner torus")
+            continue
         if budget.left < _WORTH_A_START * budget.seconds:
             break
         if not best.certificate.checks.get("source_embedded", True):
@@ -121,23 +129,6 @@ def certified_map(
         why = held if found.certificate.certified else f"not certified ({best.certificate.reason})"
         _log.info("%s: once more from another start", why)
     assert best is not None
-    while (
-        start is None and glide and options.ratio is None and least[:3] == (False, 0, False)
-        and best.distortion.element_error_mean > _POOR and budget.left > _SPARE * latest
-    ):  # fmt: skip
-        thinner = _thinner(solid, options, best, budget, progress)
-        if thinner is None:
-            break
-        _log.info("volumes are kept badly: once more on a thinner torus")
-        outcome, found = led_to(thinner, hasty=False)
-        clock, took = time.perf_counter(), time.perf_counter() - clock
-        before, latest = budget.left, before - budget.left
-        rank = _rank(outcome, found)
-        if rank >= least:
-            vain += took
-            break
-        vain += best_took
-        best, least, best_took = found, rank, took
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
@@ -150,21 +141,33 @@ def _thinner(
     budget: Budget,
     progress: Progress | None,
 ) -> Start | None:
-    """A start on a thinner torus than that of a map, if there is one."""
+    """A start on a thinner torus than that of a map, if there is one; it is the last for now."""
     there = dataclasses.replace(options, ratio=_THINNER * found.torus.ratio)
     try:
-        return next(ranked_starts(solid, there, budget, glide=True, progress=progress), None)
+        start = next(ranked_starts(solid, there, budget, glide=True, progress=progress), None)
     except SolverError:
         return None
+    return start and dataclasses.replace(start, hasty=False)
 
 
-def _rank(outcome: Outcome, found: VolumeMap) -> tuple[bool, int, bool, float]:
-    """Least of what is certified, or else has fewest flipped tets; then of what has converged, with
-    nothing held, and last of the lowest energy."""
+_Rank = tuple[bool, int, float, bool]
+
+
+def _rank(outcome: Outcome, found: VolumeMap) -> _Rank:
+    """Least of what is certified, or else has fewest flipped tets, then of the lowest energy. Last,
+    whether vertices are held."""
     minimized = [record.energy for record in outcome.history if record.stage in _MINIMIZED]
+    held = len(outcome.problem.held) > 0
+    energy = minimized[-1] if minimized else math.inf
     return (
         not found.certificate.certified,
         found.distortion.flips or 0,
-        not outcome.converged or len(outcome.problem.held) > 0,
-        minimized[-1] if minimized else math.inf,
+        energy if outcome.converged and not held else _UNFINISHED * energy,
+        held,
     )
+
+
+def _done(rank: _Rank) -> bool:
+    """Whether a map is certified with nothing held, so that other starts could but keep volumes
+    better."""
+    return not rank[0] and not rank[-1]

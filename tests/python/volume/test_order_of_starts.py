@@ -89,8 +89,11 @@ def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, 
         # Held vertices and steps cut short are both unfinished: energy tells.
         ([(2, False, 0.01), (0, False, 0.08)], 0),
         ([(2, False, 0.08), (0, False, 0.01)], 1),
-        # At rest without any: better than lower energy with some.
-        ([(2, False, 0.01), (0, True, 0.02)], 1),
+        # At rest without any: better than a little less energy with some, or when cut short.
+        ([(2, False, 0.012), (0, True, 0.02)], 1),
+        ([(2, True, 0.012), (0, True, 0.02)], 1),
+        ([(2, True, 0.012), (0, False, 0.013), (0, True, 0.02)], 2),
+        ([(2, False, 0.009), (0, True, 0.02)], 0),
     ],
 )
 def test_of_unfinished_maps_that_of_the_lowest_energy_is_best(monkeypatch, outcomes, best) -> None:
