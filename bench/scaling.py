@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from speed_page import METHODS, parser_of, run_worker, save, show
+from speed_page import METHODS, parser_of, run_worker, save, show, solid_of
 
 LAST = "certificate, result"
 
@@ -47,17 +47,12 @@ class Stages:
 
 def worker(case: str, method: str) -> dict[str, Any]:
     """The map of one case in this process."""
-    import numpy as np
 
     import stretchmap as sm
 
     # Modules imported on first use are none of the mesh's business.
     sm.volume_map(sm.samples.solid_torus(500), **METHODS[method])
-    if case.isdigit():
-        solid = sm.samples.solid_torus(int(case))
-    else:
-        with np.load(case) as arrays:
-            solid = sm.TetMesh(arrays["V"], arrays["T"])
+    solid = solid_of(case)
     stages = Stages()
     result = sm.volume_map(solid, progress=stages, **METHODS[method])
     stages(LAST, 1, 1)

@@ -23,11 +23,20 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from speed_page import HERE, METHODS, PACKAGE, parser_of, run_worker, save, show
+from speed_page import (
+    HERE,
+    METHODS,
+    PACKAGE,
+    parser_of,
+    run_worker,
+    sample_of,
+    save,
+    show,
+    solid_of,
+)
 
 KEYS = ("case", "method", "threads", "build")  # of a row
 SURFACE = "area"  # the method of surfaces
-BUMPY = "bumpy"
 MESHES = ("petal_ring_synth_14506", "vertebra_L3_ssm_16420", "rocker_arm_25182", "kitten_21584")
 
 
@@ -36,12 +45,6 @@ def peak() -> int:
     import resource
 
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-
-
-def generated(case: str) -> tuple[str, int]:
-    """Kind and size of a solid of the samples, "9000" or "bumpy:9000"; 0 of a mesh by name."""
-    kind, _, size = case.rpartition(":")
-    return (kind or "torus"), int(size) if size.isdigit() else 0
 
 
 def surface_worker(n_faces: int) -> dict[str, Any]:
@@ -80,13 +83,7 @@ def worker(job: dict[str, Any]) -> dict[str, Any]:
 
     # Modules imported on first use are none of the mesh's business.
     sm.volume_map(sm.samples.solid_torus(500), **job["arguments"])
-    if Path(job["mesh"]).suffix:
-        with np.load(job["mesh"]) as arrays:
-            solid = sm.TetMesh(arrays["V"], arrays["T"])
-    else:
-        kind, n_tets = generated(job["mesh"])
-        make = sm.samples.bumpy_torus if kind == BUMPY else sm.samples.solid_torus
-        solid = make(n_tets)
+    solid = solid_of(job["mesh"])
     base, cpu, wall = peak(), time.process_time(), time.perf_counter()
     result = sm.volume_map(solid, **job["arguments"])
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
@@ -168,7 +165,7 @@ def table(data: dict[str, Any]) -> str:
             continue
         old, new = pair["before"], pair["after"]
         micro = [1e6 * row["processor_seconds"] / row["elements"] for row in (old, new)]
-        kind, n_tets = generated(case)
+        kind, n_tets = sample_of(case)
         name = f"{kind} {n_tets:,}" if n_tets else case
         lines.append(
             f"| {name} | {new['elements']:,} | {method} | {threads} "

@@ -29,6 +29,25 @@ def parser_of(text: str | None) -> argparse.ArgumentParser:
     return parser
 
 
+def sample_of(case: str) -> tuple[str, int]:
+    """Kind and number of tets of a sample, "9000" or "bumpy:9000"; 0 tets of anything else."""
+    kind, _, size = case.rpartition(":")
+    return (kind or "torus"), int(size) if size.isdigit() else 0
+
+
+def solid_of(case: str) -> Any:
+    """The solid of a case: a sample, or a file."""
+    import numpy as np
+
+    import stretchmap as sm
+
+    kind, n_tets = sample_of(case)
+    if n_tets:
+        return {"torus": sm.samples.solid_torus, "bumpy": sm.samples.bumpy_torus}[kind](n_tets)
+    with np.load(case) as arrays:
+        return sm.TetMesh(arrays["V"], arrays["T"])
+
+
 def run_worker(
     script: str, arguments: list[str], threads: int, package: Path = PACKAGE
 ) -> dict[str, Any]:
