@@ -95,6 +95,26 @@ def slender(finer: Finer) -> np.ndarray:
     return lengths**2 / _core.area.turn_areas(finer.level.chart, turns)
 
 
+def sags_along_the_torus(finer: Finer) -> np.ndarray:
+    """What `Finer.sags` is to be, from the corners' angles alone: feet and heights in the chart."""
+    surface, chart, R = finer.level.surface, finer.level.chart, finer.ratio
+    shifts = np.stack([chart.shift_u, chart.shift_v], axis=-1)
+    corners = finer.angles[surface.F] + TWO_PI * shifts
+    torus, most = sm.Torus(R, 1.0), np.zeros(len(surface.edges))
+    heights = surface.face_areas * torus.area / surface.face_areas.sum()
+    for k in range(3):
+        a, b, c = (corners[:, (k + m) % 3] for m in range(3))
+        middle = 0.5 * (a + b)
+        scale = np.column_stack([R + np.cos(middle[:, 1]), np.ones(len(a))])
+        along, third = scale * (b - a), scale * (c - a)
+        foot = np.clip((third * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+        chord = 0.5 * (torus.xi(*a.T) + torus.xi(*b.T))
+        sag = 4.0 * foot * (1.0 - foot) * np.linalg.norm(torus.xi(*middle.T) - chord, axis=1)
+        sag *= np.linalg.norm(along, axis=1) / (2.0 * heights)
+        np.maximum.at(most, surface.topology.edge.reshape(-1, 3)[:, k], sag)
+    return most
+
+
 def chart_shares(finer: Finer) -> np.ndarray:
     """Areas of the faces in the chart of equal area, over those of the source."""
     turns = np.ascontiguousarray(finer.angles / TWO_PI)
@@ -208,6 +228,7 @@ def test_edges_whose_ends_meet_again_are_long(turns: int) -> None:
     assert (2.0 * chords < lengths)[long].any()
     edge = level.surface.topology.edge.reshape(-1, 3)
     assert sheared.sags()[edge].max(axis=1).min() > 1.0
+    assert np.allclose(sheared.sags(), sags_along_the_torus(sheared), rtol=1e-9, atol=1e-12)
     # Whatever edge of a face is halved, its longest is, too: no face becomes thinner.
     longest = edge[np.arange(len(edge)), lengths[edge].argmax(axis=1)]
     left = sheared.halved(~long).level.surface.edges @ [1, 10**6]
