@@ -315,3 +315,23 @@ def test_a_wall_of_one_cell_is_mapped_from_shapes_kept_though_some_faces_fold():
     patient = VolumeOptions(time_limit=0.1)
     found = sm.volume_map(sm.TetMesh(*cubes(plates)), options=patient)
     assert found.certificate.certified and found.converged and found.distortion.flips == 0
+
+
+def test_what_untangling_kept_is_dropped_before_steps_begin(monkeypatch):
+    solid, kept, given_back = sm.samples.bumpy_torus(1500), [], []
+    minimized, whole = engine._minimize, engine.untangle_whole
+
+    def untangled(model, *arguments, **keywords):
+        found = whole(model, *arguments, **keywords)
+        model.roomy_weights, kept.append(model)
+        return found
+
+    def watched(run, **keywords):
+        assert kept and run.history.model is not kept[-1] and given_back
+        assert not [name for name in vars(run.history.model) if name.startswith("roomy")]
+        return minimized(run, **keywords)
+
+    monkeypatch.setattr(engine, "untangle_whole", untangled)
+    monkeypatch.setattr(engine, "_minimize", watched)
+    monkeypatch.setattr(engine._core.base, "give_free_memory_back", lambda: given_back.append(1))
+    assert sm.volume_map(solid).certificate.certified and len(given_back) == 2
