@@ -3,7 +3,8 @@
     python bench/peers/run.py [MESH ...] [--c 10] [--steps 20] [--repeat 3] [--json FILE]
 
 MESH is a name in STRETCHMAP_MESHES/tets or a file; without any, a generated solid. Peers: NumPy
-with SciPy's sparse LU, and GNU Octave's backslash when octave-cli is on the path. Every
+with SciPy's sparse LU; with CHOLMOD where cvxopt and pymetis are installed, analysed once; and GNU
+Octave's backslash, which is CHOLMOD analysed in every step, when octave-cli is on the path. Every
 implementation starts at its harmonic map and runs the same number of steps; only the steps are
 timed, ours interleaved with the peers and the best of ``--repeat`` taken, since other work disturbs
 all of them.
@@ -24,7 +25,8 @@ from typing import Any
 
 import numpy as np
 import scipy.io
-from scipy_vsem import face_vectors, minimize
+from cholmod import AVAILABLE
+from scipy_vsem import by_cholmod, face_vectors, minimize
 
 import stretchmap as sm
 from stretchmap import _core, samples
@@ -77,7 +79,9 @@ def compare(solid: TetMesh, c: float, steps: int, repeat: int) -> dict[str, dict
     start[solid.boundary_vertices] = boundary.image / scale
     fixed = np.zeros(len(V), bool)
     fixed[solid.boundary_vertices] = True
-    runs = {"stretchmap": ours, "SciPy": minimize}
+    runs: dict[str, Any] = {"stretchmap": ours, "SciPy": minimize}
+    if AVAILABLE:
+        runs["CHOLMOD"] = lambda *problem: minimize(*problem, by_cholmod())
     if shutil.which("octave-cli"):
         runs["Octave"] = octave
     results: dict[str, dict[str, float]] = {}

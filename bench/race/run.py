@@ -4,10 +4,10 @@
 
 writes rows.json and docs/race.png.
 
-Needs stretchmap and, for CHOLMOD, scikit-sparse; without it the factorization is SuperLU's. The
-solids are generated. All methods start at the same map without folds, hold its boundary and lower
-the barrier energy that certified maps are made by; processor time of one thread is counted, set-up
-included.
+Needs stretchmap and, for CHOLMOD, cvxopt and pymetis; without them the factorization is SuperLU's.
+The solids are generated. All methods start at the same map without folds, hold its boundary and
+lower the barrier energy that certified maps are made by; processor time of one thread is counted,
+set-up included.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from stretchmap import samples
 RACE = Path(__file__).resolve().parents[3] / "bench" / "race"
 
 
-MODULES = ("problem", "newton", "first_order", "draw", "run")  # other benches have a run, too
+MODULES = ("problem", "newton", "first_order", "draw", "cholmod", "run")  # others have a run, too
 
 
 @pytest.fixture
