@@ -68,6 +68,36 @@ def test_what_sweeps_leave_unbalanced_stands_for_a_product(blocks, deformed_soli
         np.testing.assert_allclose(loose, tight, atol=1e-5 * abs(tight).max())
 
 
+def soft_groups(n, size, seed=0):
+    """Blocks far stiffer in two directions than in the third, along which rows far apart couple."""
+    rng = np.random.default_rng(seed)
+    soft = rng.standard_normal((n, 3))
+    soft /= np.linalg.norm(soft, axis=1)[:, None]
+    along = np.einsum("ia,ib->iab", soft, soft)
+    factors = rng.standard_normal((size, size - 1))
+    coupling = factors @ factors.T + 0.1 * np.eye(size)
+    coupling /= np.sqrt(np.outer(coupling.diagonal(), coupling.diagonal()))
+    i, j = (rows.ravel() for rows in np.indices((size, size)))
+    columns = np.arange(n).reshape(size, -1)
+    rows, cols = columns[i].ravel(), columns[j].ravel()
+    values = np.repeat(coupling[i, j], n // size)[:, None, None] * np.einsum(
+        "ea,eb->eab", soft[rows], soft[cols]
+    )
+    values[rows == cols] += 100.0 * (np.eye(3) - along[rows[rows == cols]])
+    order = np.lexsort((cols, rows))
+    starts = size * np.arange(n + 1)
+    return sp.bsr_matrix((values[order], cols[order], starts), shape=(3 * n, 3 * n))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sweeps_in_parts_are_definite_where_blocks_are_stiff_in_some_directions(seed):
+    blocks = soft_groups(6000, 6, seed)
+    rhs = np.random.default_rng(3).standard_normal((blocks.shape[0] // 3, 3))
+    x, report = block_solver(blocks, ordered=True).solve(rhs, np.zeros_like(rhs), 1e-8, 200)
+    assert report.converged and not report.negative_curvature
+    assert relative_residual(blocks, x.reshape(-1, 1), rhs.reshape(-1, 1)) < 1e-7
+
+
 def test_kept_sweeps_tell_nothing_of_new_values(deformed_solid):
     """They leave the old equations unbalanced: products are made with the new ones."""
     blocks, stiffer = deformed_solid(0.3)[0], deformed_solid(0.45)[0]

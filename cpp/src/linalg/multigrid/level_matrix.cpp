@@ -1,5 +1,6 @@
 #include "linalg/multigrid/level_matrix.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 
@@ -148,23 +149,42 @@ std::vector<Index> LevelMatrix<B>::set_diagonals() {
   return rows;
 }
 
+// Of the simultaneous sweeps M, M + M' - A has to be positive definite. It is the enlarged diagonal
+// less the couplings to other chunks, and in units of the diagonal blocks a row outweighs these by
+// their norms.
 template <int B>
 void LevelMatrix<B>::set_excess() {
   constexpr size_t kSize = B * B;
   excess.assign(n, 0.0f);
-  const auto size_of = [&](Index i) {
-    return Eigen::Map<const RowBlock<double, B>>(diagonal.data() + kSize * i).trace() / B;
+  std::vector<Index> place(n, -1), coupled;
+  for (Index i = 0; i < n; ++i) {
+    if (lower[i] == start[i]) continue;
+    place[i] = static_cast<Index>(coupled.size());
+    coupled.push_back(i);
+  }
+  std::vector<ColBlock<double, B>> root(coupled.size());
+  for_chunks(static_cast<Index>(coupled.size()), kRows, [&](Index begin, Index end) {
+    for (Index k = begin; k < end; ++k) {
+      const Eigen::Map<const RowBlock<double, B>> block(diagonal.data() + kSize * coupled[k]);
+      root[k] = ColBlock<double, B>(block).llt().matrixL();
+    }
+  });
+  const auto relative = [&](Index i, Index e) {
+    const auto entry = block(e);
+    ColBlock<double, B> scaled = Eigen::Map<const RowBlock<double, B>>(entry.data());
+    root[place[i]].template triangularView<Eigen::Lower>().solveInPlace(scaled);
+    scaled.transposeInPlace();
+    root[place[col[e]]].template triangularView<Eigen::Lower>().solveInPlace(scaled);
+    return scaled.norm();
   };
-  for_chunks(n, kRows, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) {
-      if (lower[i] == start[i]) continue;
+  for_chunks(static_cast<Index>(coupled.size()), kRows, [&](Index begin, Index end) {
+    for (Index k = begin; k < end; ++k) {
+      const Index i = coupled[k];
       double coupling = 0.0;
-      for (Index e = start[i]; e < lower[i]; ++e)
-        coupling += Eigen::Map<const RowBlock<double, B>>(block(e).data()).norm() /
-                    std::sqrt(size_of(i) * size_of(col[e]));
+      for (Index e = start[i]; e < lower[i]; ++e) coupling += relative(i, e);
       const double enlarge = std::max(1.0, 0.5 * (1.0 + coupling));
       excess[i] = static_cast<float>(1.0 - 1.0 / enlarge);
-      for (size_t k = 0; k < kSize; ++k) inverse_f[kSize * i + k] /= static_cast<float>(enlarge);
+      for (size_t j = 0; j < kSize; ++j) inverse_f[kSize * i + j] /= static_cast<float>(enlarge);
     }
   });
 }
