@@ -1,4 +1,3 @@
-#include <cstdio>
 #include "linalg/krylov/pcg.hpp"
 
 #include <algorithm>
@@ -181,7 +180,6 @@ struct Run {
         if (done(k)) continue;  // this column rests
         if (pq[k] <= 0.0 || rz[k] <= 0.0) {
           result.negative_curvature = true;
-          std::fprintf(stderr, "NEG it=%d pq=%g rz=%g rr=%g first=%d\n", result.iterations, pq[k], rz[k], rr[k], int(products()));
           alpha = {};
           // At the very first step there is no iterate to keep: the preconditioned gradient.
           if (result.iterations == 0 && rz[k] > 0.0) alpha[k] = 1.0;
