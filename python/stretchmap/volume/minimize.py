@@ -25,6 +25,7 @@ _SERVED = 0.5  # a shorter step shows that a Hessian is too old
 # After a step that was promised much and cut shorter than that, so many more prove nothing: where
 # single elements fill the gradient, the solver sees nothing else.
 _CUT, _DOUBT = 1e-2, 5
+_IDLE = 20  # steps in a row that gain next to nothing prove it all the same
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
@@ -114,10 +115,11 @@ class _Standstill:
     """Whether a step shows that there is nothing left to gain.
 
     One that few tets cut short, or from a poor solve, gains little and proves nothing; nor do those
-    that follow one that was promised much.
+    that follow one that was promised much. Many in a row do.
     """
 
     doubt: int = 0
+    idle: int = 0
 
     def shown(self, step: _core.volume.NewtonReport, enough: float) -> bool:
         """Of a step of which a gain of ``enough`` would be worth while."""
@@ -126,8 +128,10 @@ class _Standstill:
             self.doubt = _DOUBT
         else:
             self.doubt = max(self.doubt - 1, 0)
-        gain = max(step.before.energy - step.after.energy, predicted)
-        return gain <= enough and not step.negative_curvature and not self.doubt
+        small = max(step.before.energy - step.after.energy, predicted) <= enough
+        self.idle = self.idle + 1 if small else 0
+        proved = not (step.negative_curvature or self.doubt)
+        return small and (proved or self.idle >= _IDLE)
 
 
 def grown(weight: float, alpha: float, growth: float, goal: float) -> float:

@@ -15,12 +15,16 @@ from stretchmap.volume.minimize import minimize
 from stretchmap.volume.options import FillOptions
 
 
-def steps(*lengths_and_promises):
+def steps(*lengths_and_promises, negative_curvature=False):
     """Steps that gain next to nothing."""
     report = SimpleNamespace(energy=1e4, flips=0, folds=0)
     for alpha, decrement in lengths_and_promises:
         yield SimpleNamespace(
-            before=report, after=report, alpha=alpha, decrement=decrement, negative_curvature=False
+            before=report,
+            after=report,
+            alpha=alpha,
+            decrement=decrement,
+            negative_curvature=negative_curvature,
         )
 
 
@@ -33,7 +37,17 @@ def steps(*lengths_and_promises):
 )
 def test_a_small_promise_after_a_large_one_that_was_not_kept_is_no_rest(promises, records):
     """Of a gradient that one flat tet fills, a solver sees nothing else: it promises nothing."""
-    given = steps(*promises)
+    assert steps_until_rest(steps(*promises)) == records
+
+
+def test_many_steps_of_negative_curvature_that_gain_nothing_are_rest():
+    assert steps_until_rest(steps(*[(1.0, 1e-9)] * 30, negative_curvature=True)) == 20
+    large = steps(*[(1.0, 1e-9)] * 10, (1.0, 1e3), *[(1.0, 1e-9)] * 30, negative_curvature=True)
+    assert steps_until_rest(large) == 31
+
+
+def steps_until_rest(given):
+    """Steps taken of those given until the minimization says that it converged."""
     newton = SimpleNamespace(set_targets=lambda _: None, step=lambda x, *_: (x, next(given)))
     options = FillOptions(shared=1)
     model = SimpleNamespace(
@@ -49,7 +63,8 @@ def test_a_small_promise_after_a_large_one_that_was_not_kept_is_no_rest(promises
     )
     goal = options.volume_weight
     done = minimize(model, np.zeros((4, 3)), history, glide=False, start=goal, goal=goal)
-    assert done.converged and len(kept) == records
+    assert done.converged
+    return len(kept)
 
 
 def asked_of(volumes, alphas):
