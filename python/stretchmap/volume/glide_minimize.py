@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from .. import _core
 from .glide_relax import Relaxation
 from .glide_targets import GlideTargets
-from .minimize import Minimized, grown
+from .minimize import IDLE, Minimized, grown
 from .model import History, SolidModel
 
 __all__ = ["minimize_on_mesh"]
 
 _SHORT = 0.5  # a step that asks for the other axes
-_IDLE = 20  # steps in a row that gain next to nothing
 
 
 class _Minimizers:
@@ -96,7 +95,7 @@ def minimize_on_mesh(
             targets.learn(x)
         # Both kinds of axes have to agree that nothing is to be gained.
         idle = idle + 1 if before - after <= o.glide_tol * before else 0
-        if idle >= _IDLE or targets.stalled:
+        if idle >= IDLE or targets.stalled:
             reason, converged = "volumes are kept as far as can be", weight == o.volume_weight
             break
     best = x if targets.best is None else targets.best

@@ -19,13 +19,13 @@ from .glide_relax import Relaxation
 from .model import History, SolidModel
 from .options import FillOptions, VolumeOptions
 
-__all__ = ["Minimized", "grown", "minimize"]
+__all__ = ["IDLE", "Minimized", "grown", "minimize"]
 
 _SERVED = 0.5  # a shorter step shows that a Hessian is too old
 # After a step that was promised much and cut shorter than that, so many more prove nothing: where
 # single elements fill the gradient, the solver sees nothing else.
 _CUT, _DOUBT = 1e-2, 5
-_IDLE = 20  # steps in a row that gain next to nothing prove it all the same
+IDLE = 20  # steps in a row that gain next to nothing prove it all the same
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
@@ -131,7 +131,7 @@ class _Standstill:
         small = max(step.before.energy - step.after.energy, predicted) <= enough
         self.idle = self.idle + 1 if small else 0
         proved = not (step.negative_curvature or self.doubt)
-        return small and (proved or self.idle >= _IDLE)
+        return small and (proved or self.idle >= IDLE)
 
 
 def grown(weight: float, alpha: float, growth: float, goal: float) -> float:
