@@ -28,7 +28,7 @@ class Cholmod:
 
     def __init__(self, lower: sp.csc_matrix) -> None:
         from cvxopt import cholmod, matrix, spmatrix
-        from pymetis import nested_dissection
+        from pymetis import CSRAdjacency, nested_dissection
 
         self._cholmod, self._matrix = cholmod, matrix
         cholmod.options.update(supernodal=2, print=0)
@@ -39,8 +39,7 @@ class Cholmod:
         )  # fmt: skip
         below = sp.tril(lower, -1)
         graph = (below + below.T).tocsr()
-        rows = np.split(graph.indices, graph.indptr[1:-1])
-        order, _ = nested_dissection(adjacency=rows)
+        order, _ = nested_dissection(CSRAdjacency(graph.indptr, graph.indices))
         self._symbolic = cholmod.symbolic(self._lower, p=matrix(list(map(int, order))))
 
     def solve(self, values: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
