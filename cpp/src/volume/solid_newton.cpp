@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/parallel.hpp"
@@ -57,12 +58,13 @@ void SolidNewton::try_double_step(Points& x, const Points& start, const Points& 
 // If single tets cut the step short: the others' whole step, theirs shortened, where that is lower.
 void SolidNewton::try_held_back(Points& x, const Points& start, Points& direction,
                                 const EnergyWeights& w, NewtonReport& report) const {
-  Points shortened = energy_.held_back(start, direction);
-  Points trial = energy_.move(start, shortened, 1.0);
+  std::optional<Points> shortened = energy_.held_back(start, direction);
+  if (!shortened) return;
+  Points trial = energy_.move(start, *shortened, 1.0);
   const EnergyReport there = energy_.value(trial, w);
   if (!(there.energy < report.after.energy)) return;
   x = std::move(trial);
-  direction = std::move(shortened);
+  direction = std::move(*shortened);
   report.after = there;
   report.alpha = 1.0;
 }

@@ -17,6 +17,9 @@ constexpr double kShare = 0.9, kWholeStep = 1.0 / kShare;
 constexpr int kHoldingPasses = 6;
 constexpr int kEasingPasses = 6;
 constexpr double kEasing = 0.25;  // what is left of a step at the vertices of an element it harms
+// Elements that hold up all others, at most, where their own steps are worth a look: with more, it
+// is a matter of the whole, and of hundreds of tries none was seen to lead lower.
+constexpr Index kSingle = 20;
 
 }  // namespace
 
@@ -53,19 +56,19 @@ double SolidEnergy::longest_step(const PointsRef& x, const PointsRef& step) cons
   return std::min(1.0, kShare * longest_steps(tets_, x, in_space(x, step), kWholeStep).minCoeff());
 }
 
-Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
+std::optional<Points> SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
   Points direction = in_space(x, step), shortened = step;
   for (int pass = 0; pass < kHoldingPasses; ++pass) {
     const Vec longest = longest_steps(tets_, x, direction, kWholeStep);
+    const auto held = (longest.array() < kWholeStep).count();
+    if (pass == 0 && (held == 0 || held > kSingle)) return std::nullopt;
+    if (held == 0) break;
     Vec share = Vec::Ones(x.rows());
-    bool held = false;
     for (Index t = 0; t < longest.size(); ++t) {
       if (longest[t] >= kWholeStep) continue;
-      held = true;
       for (int a = 0; a < 4; ++a)
         share[tets_(t, a)] = std::min(share[tets_(t, a)], kShare * kShare * longest[t]);
     }
-    if (!held) break;
     direction.array().colwise() *= share.array();
     for (Index row = 0; row < rows(); ++row) shortened.row(row) *= share[row_vertex_[row]];
   }
@@ -75,12 +78,15 @@ Points SolidEnergy::held_back(const PointsRef& x, const PointsRef& step) const {
 EasedStep SolidEnergy::eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w,
                              double most, double enough) const {
   EasedStep best;
+  const bool bent = barrier_.size() > 0 && !barrier_.surface().smooth();
   Energies before = energies(x, w);
   const double goal = summed(before).energy - enough;
   before.det.resize(0);
   Points shortened = step;
   Energies after = energies(move(x, shortened, 1.0), w);
-  for (int pass = 0; pass < kEasingPasses && shorten(before, after, most, shortened); ++pass) {
+  for (int pass = 0; pass < kEasingPasses; ++pass) {
+    const Index harmed = shorten(before, after, most, shortened);
+    if (harmed == 0 || (pass == 0 && harmed > kSingle && !bent)) break;
     Points image = move(x, shortened, 1.0);
     after = {};  // before there are others
     after = energies(image, w);
@@ -92,23 +98,22 @@ EasedStep SolidEnergy::eased(const PointsRef& x, const PointsRef& step, const En
   return best;
 }
 
-// A share of the step at the vertices of the elements it raises by more than `most`; whether there
-// are any.
-bool SolidEnergy::shorten(const Energies& before, const Energies& after, double most,
-                          Points& step) const {
+// A share of the step at the vertices of the elements it raises by more than `most`; their number.
+Index SolidEnergy::shorten(const Energies& before, const Energies& after, double most,
+                           Points& step) const {
   Flags harmed = Flags::Zero(motion_.size());
-  bool any = false;
+  Index count = 0;
   const auto hold = [&](const auto& corners, double rise) {
     if (rise <= most) return;
-    any = true;
+    ++count;
     for (const Index i : corners) harmed[i] = 1;
   };
   for (Index t = 0; t < before.tets.size(); ++t) hold(tets_.row(t), after.tets[t] - before.tets[t]);
   for (Index f = 0; f < before.faces.size(); ++f)
     hold(barrier_.faces().row(f), after.faces[f] - before.faces[f]);
-  for (Index row = 0; any && row < rows(); ++row)
+  for (Index row = 0; count > 0 && row < rows(); ++row)
     if (harmed[row_vertex_[row]]) step.row(row) *= kEasing;
-  return any;
+  return count;
 }
 
 Rows SolidEnergy::near_nullspace(const PointsRef& x) const {

@@ -13,6 +13,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "stretchmap/linalg/block_solver.hpp"
@@ -79,13 +80,14 @@ class SolidEnergy {
   double longest_step(const PointsRef& x, const PointsRef& step) const;
 
   // \return the step, shortened at the vertices of those tets that would turn over first, so that a
-  //         handful of them does not hold up all others.
-  Points held_back(const PointsRef& x, const PointsRef& step) const;
+  //         handful of them does not hold up all others; nothing if none does, or too many do.
+  std::optional<Points> held_back(const PointsRef& x, const PointsRef& step) const;
 
   // Where vertices glide, a few may go uphill that the model sends down: at the edges of a mesh it
   // knows the surface on one side only.
   // The step is shortened at the vertices of those elements whose energy it raises by more than
-  // `most`, again and again until the energy falls by `enough`.
+  // `most`, again and again until the energy falls by `enough`. On a smooth surface only a handful
+  // may be.
   // \return the best of these; an infinite energy if there are none.
   EasedStep eased(const PointsRef& x, const PointsRef& step, const EnergyWeights& w, double most,
                   double enough) const;
@@ -109,7 +111,7 @@ class SolidEnergy {
   };
   Energies energies(const PointsRef& x, const EnergyWeights& w) const;
   static EnergyReport summed(const Energies& found);
-  bool shorten(const Energies& before, const Energies& after, double most, Points& step) const;
+  Index shorten(const Energies& before, const Energies& after, double most, Points& step) const;
   void number_sites();
   void build_pattern();
   void find_face_slots();
