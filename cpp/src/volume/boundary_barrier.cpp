@@ -54,15 +54,22 @@ BoundaryBarrier::State BoundaryBarrier::state(const PointsRef& x, const GlideSit
   return s;
 }
 
-// Gradient by corner i of sigma_k, the area vector held: how the direction turns.
-Vector3d BoundaryBarrier::turned(const State& s, const GlideSites& sites, Index f, int k,
-                                 int i) const {
-  const GlideSite& site = sites(boundary_.faces(f, i));
-  if (s.samples == 1)
-    return site.turn.transpose() * (s.area - s.sigma[0] * s.normal[0]) / std::max(s.length, 1e-300);
-  if (k < 3) return k == i ? Vector3d(site.turn.transpose() * s.area) : Vector3d::Zero();
-  const Index place = sites(boundary_.faces(f, 0)).place;
-  return surface().outward_derivative(s.centroid, place).transpose() * s.area / 3.0;
+// Gradients by the corners of sigma_k, the area vector held: how the direction turns.
+std::array<Vector3d, 3> BoundaryBarrier::turned(const State& s, const GlideSites& sites, Index f,
+                                                int k) const {
+  std::array<Vector3d, 3> by_corner;
+  by_corner.fill(Vector3d::Zero());
+  const auto turn = [&](int i) { return sites(boundary_.faces(f, i)).turn.transpose(); };
+  if (s.samples == 1) {
+    for (int i = 0; i < 3; ++i)
+      by_corner[i] = turn(i) * (s.area - s.sigma[0] * s.normal[0]) / std::max(s.length, 1e-300);
+  } else if (k < 3) {
+    by_corner[k] = turn(k) * s.area;
+  } else {
+    const Index place = sites(boundary_.faces(f, 0)).place;
+    by_corner.fill(surface().outward_derivative(s.centroid, place).transpose() * s.area / 3.0);
+  }
+  return by_corner;
 }
 
 FaceReport BoundaryBarrier::value(const PointsRef& x, const GlideSites& sites, Index f,
@@ -101,10 +108,11 @@ void BoundaryBarrier::model(const PointsRef& x, const GlideSites& sites, Index f
 
   for (int k = 0; k < s.samples; ++k) {
     Vector6 d;  // gradient of sigma_k
+    const std::array<Vector3d, 3> turning = turned(s, sites, f, k);
     for (int i = 0; i < 3; ++i) {
       const Vector3d by_area =
           0.5 * s.inverse_area * (s.x[(i + 1) % 3] - s.x[(i + 2) % 3]).cross(s.normal[k]);
-      d.segment<2>(2 * i) = axes[i].transpose() * (by_area + turned(s, sites, f, k, i));
+      d.segment<2>(2 * i) = axes[i].transpose() * (by_area + turning[i]);
     }
 
     const double sigma = s.sigma[k], N = I + sigma * sigma + 1.0;

@@ -260,8 +260,9 @@ def patches_round(
     inside = free[corners]
     # Tets and the free vertices they share: parts of this graph are patches.
     owner = np.broadcast_to(np.arange(len(rows))[:, None], corners.shape)[inside]
-    n = len(rows) + len(model.V)
-    links = coo_matrix((np.ones(len(owner), np.int8), (owner, len(rows) + corners[inside])), (n, n))
+    shared, place = np.unique(corners[inside], return_inverse=True)
+    n = len(rows) + len(shared)
+    links = coo_matrix((np.ones(len(owner), np.int8), (owner, len(rows) + place)), (n, n))
     label = connected_components(links, directed=False)[1][: len(rows)]
     found = []
     for part in np.unique(label):

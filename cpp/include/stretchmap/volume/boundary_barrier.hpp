@@ -15,6 +15,7 @@
 // semi-definite without any projection.
 #pragma once
 
+#include <array>
 #include <memory>
 
 #include "stretchmap/mesh/size.hpp"
@@ -59,7 +60,8 @@ class BoundaryBarrier {
  private:
   struct State;
   State state(const PointsRef& x, const GlideSites& sites, Index f) const;
-  Eigen::Vector3d turned(const State& s, const GlideSites& sites, Index f, int k, int i) const;
+  std::array<Eigen::Vector3d, 3> turned(const State& s, const GlideSites& sites, Index f,
+                                        int k) const;
 
   GlidingBoundary boundary_;
 };
