@@ -63,6 +63,12 @@ void bind_newton(py::module_& m) {
       .def_readonly("min_facing", &EnergyReport::min_facing)
       .def_readonly("folds", &EnergyReport::folds)
       .def_readonly("flips", &EnergyReport::flips);
+  const auto ids = [](const std::vector<Index>& found) {
+    return IndexVec(Eigen::Map<const IndexVec>(found.data(), static_cast<Index>(found.size())));
+  };
+  py::class_<HeldUp>(m, "HeldUp")
+      .def_property_readonly("tets", [ids](const HeldUp& self) { return ids(self.tets); })
+      .def_property_readonly("faces", [ids](const HeldUp& self) { return ids(self.faces); });
   py::class_<NewtonReport>(m, "NewtonReport")
       .def_readonly("before", &NewtonReport::before)
       .def_readonly("after", &NewtonReport::after)
@@ -72,6 +78,7 @@ void bind_newton(py::module_& m) {
       .def_readonly("cg_iterations", &NewtonReport::cg_iterations)
       .def_readonly("negative_curvature", &NewtonReport::negative_curvature)
       .def_readonly("cg_residual", &NewtonReport::cg_residual)
+      .def_readonly("held_up", &NewtonReport::held_up)
       .def_readonly("shift", &NewtonReport::shift);
   py::class_<GlideSurface, std::shared_ptr<GlideSurface>>(m, "GlideSurface")
       .def_property_readonly("area", &GlideSurface::area);

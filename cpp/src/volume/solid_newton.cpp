@@ -159,6 +159,7 @@ void SolidNewton::try_eased(Points& x, const Points& start, Points& direction,
                             const EnergyWeights& w, NewtonReport& report) const {
   EasedStep eased =
       energy_.eased(start, direction, w, kRise * report.decrement, kWorthwhile * report.decrement);
+  report.held_up = std::move(eased.held_up);
   if (!(eased.there.energy < report.after.energy)) return;
   x = std::move(eased.image);
   direction = std::move(eased.step);

@@ -19,7 +19,7 @@ constexpr int kEasingPasses = 6;
 constexpr double kEasing = 0.25;  // what is left of a step at the vertices of an element it harms
 // Elements that hold up all others, at most, where their own steps are worth a look: with more, it
 // is a matter of the whole, and of hundreds of tries none was seen to lead lower.
-constexpr Index kSingle = 20;
+constexpr std::size_t kSingle = 20;
 
 }  // namespace
 
@@ -60,8 +60,8 @@ std::optional<Points> SolidEnergy::held_back(const PointsRef& x, const PointsRef
   Points direction = in_space(x, step), shortened = step;
   for (int pass = 0; pass < kHoldingPasses; ++pass) {
     const Vec longest = longest_steps(tets_, x, direction, kWholeStep);
-    const auto held = (longest.array() < kWholeStep).count();
-    if (pass == 0 && (held == 0 || held > kSingle)) return std::nullopt;
+    const auto held = static_cast<std::size_t>((longest.array() < kWholeStep).count());
+    if (held > kSingle || (held == 0 && pass == 0)) return std::nullopt;
     if (held == 0) break;
     Vec share = Vec::Ones(x.rows());
     for (Index t = 0; t < longest.size(); ++t) {
@@ -85,35 +85,45 @@ EasedStep SolidEnergy::eased(const PointsRef& x, const PointsRef& step, const En
   Points shortened = step;
   Energies after = energies(move(x, shortened, 1.0), w);
   for (int pass = 0; pass < kEasingPasses; ++pass) {
-    const Index harmed = shorten(before, after, most, shortened);
-    if (harmed == 0 || (pass == 0 && harmed > kSingle && !bent)) break;
+    HeldUp at = harmed(before, after, most);
+    if (at.size() == 0 || (at.size() > kSingle && !bent)) break;
+    shorten(at, shortened);
+    if (pass == 0 && at.size() <= kSingle) {
+      best.held_up = std::move(at);
+      for (Index& t : best.held_up.tets) t = order_[t];
+    }
     Points image = move(x, shortened, 1.0);
     after = {};  // before there are others
     after = energies(image, w);
     const EnergyReport there = summed(after);
     if (!(there.energy < best.there.energy)) continue;
-    best = {shortened, std::move(image), there};
+    best.step = shortened;
+    best.image = std::move(image);
+    best.there = there;
     if (there.energy < goal) break;
   }
   return best;
 }
 
-// A share of the step at the vertices of the elements it raises by more than `most`; their number.
-Index SolidEnergy::shorten(const Energies& before, const Energies& after, double most,
-                           Points& step) const {
-  Flags harmed = Flags::Zero(motion_.size());
-  Index count = 0;
-  const auto hold = [&](const auto& corners, double rise) {
-    if (rise <= most) return;
-    ++count;
-    for (const Index i : corners) harmed[i] = 1;
-  };
-  for (Index t = 0; t < before.tets.size(); ++t) hold(tets_.row(t), after.tets[t] - before.tets[t]);
+// The elements whose energy rises by more than `most`, as they are numbered here.
+HeldUp SolidEnergy::harmed(const Energies& before, const Energies& after, double most) {
+  HeldUp found;
+  for (Index t = 0; t < before.tets.size(); ++t)
+    if (!(after.tets[t] - before.tets[t] <= most)) found.tets.push_back(t);
   for (Index f = 0; f < before.faces.size(); ++f)
-    hold(barrier_.faces().row(f), after.faces[f] - before.faces[f]);
-  for (Index row = 0; count > 0 && row < rows(); ++row)
+    if (!(after.faces[f] - before.faces[f] <= most)) found.faces.push_back(f);
+  return found;
+}
+
+// A share of the step at their vertices.
+void SolidEnergy::shorten(const HeldUp& at, Points& step) const {
+  Flags harmed = Flags::Zero(motion_.size());
+  for (const Index t : at.tets)
+    for (const Index i : tets_.row(t)) harmed[i] = 1;
+  for (const Index f : at.faces)
+    for (const Index i : barrier_.faces().row(f)) harmed[i] = 1;
+  for (Index row = 0; row < rows(); ++row)
     if (harmed[row_vertex_[row]]) step.row(row) *= kEasing;
-  return count;
 }
 
 Rows SolidEnergy::near_nullspace(const PointsRef& x) const {

@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.linalg
 import typing
-__all__: list[str] = ['EnergyReport', 'EnergyWeights', 'GlideSurface', 'GlidingBoundary', 'MeshSurface', 'NewtonOptions', 'NewtonReport', 'RingProjection', 'RingStep', 'SolidNewton', 'TorusSurface', 'VolumetricStretch', 'level_histogram', 'level_lookup', 'rest_matrices', 'rest_triangles', 'tet_stretch_energy']
+__all__: list[str] = ['EnergyReport', 'EnergyWeights', 'GlideSurface', 'GlidingBoundary', 'HeldUp', 'MeshSurface', 'NewtonOptions', 'NewtonReport', 'RingProjection', 'RingStep', 'SolidNewton', 'TorusSurface', 'VolumetricStretch', 'level_histogram', 'level_lookup', 'rest_matrices', 'rest_triangles', 'tet_stretch_energy']
 class VolumetricStretch:
     def __init__(self, tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], fixed: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"], rest_volumes: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], backend: str = 'auto') -> None:
         ...
@@ -45,6 +45,13 @@ class EnergyReport:
     @property
     def min_facing(self) -> float:
         ...
+class HeldUp:
+    @property
+    def faces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        ...
+    @property
+    def tets(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        ...
 class NewtonReport:
     @property
     def after(self) -> EnergyReport:
@@ -66,6 +73,9 @@ class NewtonReport:
         ...
     @property
     def gradient_norm(self) -> float:
+        ...
+    @property
+    def held_up(self) -> HeldUp:
         ...
     @property
     def negative_curvature(self) -> bool:

@@ -207,7 +207,7 @@ def minimize(
             newton.set_targets(goals)
         x, step = newton.step(x, weights, linear)
         if relaxation is not None and step.alpha < _SERVED:
-            x = relaxation.relaxed(x, goals, weights)
+            x = relaxation.relaxed(x, goals, weights, step.held_up)
         before, after = step.before.energy / weight, step.after.energy / weight
         history.add(
             stage, iteration, x, energy=after, step=step.alpha, residual=step.decrement, total=total

@@ -1,8 +1,12 @@
 // The assembled energy of a solid: derivatives, and faces whose vertices do not move.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
+#include <vector>
 
+#include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
 #include "stretchmap/volume/rest_shape.hpp"
 #include "stretchmap/volume/solid_energy.hpp"
@@ -86,6 +90,47 @@ TEST_CASE("the gradient of a solid's energy matches differences") {
         [&](double t) { return energy.value(energy.move(x, step, t), weights).energy; }, 1e-6);
     CHECK(slope == doctest::Approx((gradient.array() * step.array()).sum()).epsilon(1e-6));
   }
+}
+
+TEST_CASE("a handful of elements that a whole step harms are named as they were given") {
+  const tests::Solid solid = tests::solid_torus(600);
+  const Points& x = solid.points;
+  const SolidEnergy energy = energy_of(solid, motion_of(solid, 1));
+  Points steps = Points::Zero(energy.rows(), 3);
+  for (Index row = 0; row < energy.rows(); ++row) steps(row, 0) = row + 1.0;
+  const Points numbered = energy.move(x, steps, 1.0) - x;
+  const auto inverted = [&](const Points& at) {
+    std::vector<Index> found;
+    const Vec volumes = mesh::tet_volumes(at, solid.tets);
+    for (Index t = 0; t < volumes.size(); ++t)
+      if (!(volumes[t] > 0.0)) found.push_back(t);
+    return found;
+  };
+  const EnergyWeights weights{1.0, 1.0, 0.0, 0.0};
+  const double before = energy.value(x, weights).energy;
+  int tried = 0;
+  for (Index t = 0; t < solid.tets.rows() && tried < 20; ++t) {
+    const Index tip = solid.tets(t, 0);
+    if (solid.boundary[tip]) continue;
+    ++tried;
+    Points step = Points::Zero(energy.rows(), 3);  // the tip, through the face across
+    const Eigen::RowVector3d across =
+        (x.row(solid.tets(t, 1)) + x.row(solid.tets(t, 2)) + x.row(solid.tets(t, 3))) / 3.0;
+    step.row(std::lround(numbered(tip, 0)) - 1) = 1.2 * (across - x.row(tip));
+    const volume::EasedStep eased = energy.eased(x, step, weights, before, before);
+    std::vector<Index> named = eased.held_up.tets;
+    std::sort(named.begin(), named.end());
+    const std::vector<Index> expected = inverted(energy.move(x, step, 1.0));
+    CHECK(std::includes(named.begin(), named.end(), expected.begin(), expected.end()));
+    CHECK(std::binary_search(named.begin(), named.end(), t));
+    for (const Index other : named) CHECK((solid.tets.row(other).array() == tip).any());
+  }
+  REQUIRE(tried == 20);
+  const Points all = 10.0 * tests::random_points(energy.rows(), 6);
+  const volume::EasedStep eased = energy.eased(x, all, weights, 0.0, before);
+  CHECK(eased.held_up.size() == 0);
+  CHECK(std::isinf(eased.there.energy));
+  CHECK(!energy.held_back(x, all).has_value());
 }
 
 TEST_SUITE_END();

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -123,16 +124,41 @@ def test_of_many_flat_tets_on_the_torus_the_worst_is_opened():
     assert Relaxation(on_mesh).relaxed(problem.x, asked, WEIGHTS) is problem.x
 
 
+@pytest.mark.parametrize("kind", ["tets", "faces"])
+def test_what_holds_up_others_is_seen_to_though_nothing_is_near_to_folding(kind):
+    result = sm.volume_map(sm.samples.bumpy_torus(3000), max_iter=3)
+    start = VolumeProblem.of(result.mesh, result.image, torus=result.torus, refine=None, warm=True)
+    model, x = start.model(VolumeOptions()), start.x
+    asked, relaxation = np.ones(len(model.T)), Relaxation(model)
+    assert relaxation.relaxed(x, asked, WEIGHTS) is x
+    none = np.empty(0, np.int32)
+    newton = model.newton(x, glide=True)
+    for one in (7, 100):
+        elements = SimpleNamespace(**{"tets": none, "faces": none, kind: np.array([one])})
+        at = relaxation.relaxed(x, asked, WEIGHTS, elements)
+        assert newton.value(at, WEIGHTS).energy < newton.value(x, WEIGHTS).energy
+        corners = model.T[one] if kind == "tets" else model.faces[one]
+        moved = (at != x).any(axis=1)
+        assert moved[corners].any() and moved.sum() < 0.3 * len(x)
+        near = np.zeros(len(x), bool)
+        near[corners] = True
+        for _ in range(_RINGS + (kind == "faces")):
+            near[model.T[near[model.T].any(axis=1)]] = True
+        assert not moved[~near].any()
+
+
 def test_short_steps_on_the_torus_are_followed_by_it(monkeypatch):
-    called = []
+    called, held_up = [], []
     relaxed = Relaxation.relaxed
 
     def counted(self, x, *rest):
         at = relaxed(self, x, *rest)
         called.append(at is not x)
+        held_up.append(len(rest[-1].tets) + len(rest[-1].faces))
         return at
 
     monkeypatch.setattr(Relaxation, "relaxed", counted)
     result = sm.volume_map(mug(7, 1, 7), options=VolumeOptions(time_limit=0.01))
     short = [r for r in result.history if r.stage == "glide" and r.step < 0.5]
     assert len(called) == len(short) > 0 and any(called)
+    assert any(held_up) and max(held_up) < 100

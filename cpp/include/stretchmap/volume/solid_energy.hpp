@@ -33,10 +33,18 @@ struct EnergyReport {
   Index folds = 0;          // faces with one that is not positive
 };
 
+// Elements whose energy a whole step would raise.
+struct HeldUp {
+  std::vector<Index> tets, faces;
+
+  std::size_t size() const { return tets.size() + faces.size(); }
+};
+
 // A step shortened at some vertices, where it leads, and the energy there.
 struct EasedStep {
   Points step, image;
   EnergyReport there{std::numeric_limits<double>::infinity()};
+  HeldUp held_up;  // if it is but a handful, by the numbers tets and faces were given with
 };
 
 struct SolidElements {
@@ -111,7 +119,8 @@ class SolidEnergy {
   };
   Energies energies(const PointsRef& x, const EnergyWeights& w) const;
   static EnergyReport summed(const Energies& found);
-  Index shorten(const Energies& before, const Energies& after, double most, Points& step) const;
+  static HeldUp harmed(const Energies& before, const Energies& after, double most);
+  void shorten(const HeldUp& at, Points& step) const;
   void number_sites();
   void build_pattern();
   void find_face_slots();

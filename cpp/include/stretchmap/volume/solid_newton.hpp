@@ -30,6 +30,7 @@ struct NewtonReport {
   int cg_iterations = 0;
   double cg_residual = 0.0;
   bool negative_curvature = false;  // met by the conjugate gradients, which then stopped early
+  HeldUp held_up;      // a handful of elements that cut the step short, if it is no more than that
   double shift = 0.0;  // added to the Hessian's diagonal, as a share of it, before a step was found
 };
 
