@@ -75,9 +75,11 @@ def asked_of(volumes, alphas):
 
     def step(x, *_):
         return x, SimpleNamespace(
-            before=report, after=report, alpha=next(given), decrement=1.0, negative_curvature=False
-        )
+            before=report, after=report, alpha=next(given), decrement=1.0, negative_curvature=False,
+            held_up=held_up,
+        )  # fmt: skip
 
+    held_up = object()
     newton = SimpleNamespace(set_targets=asked.append, step=step)
     model = SimpleNamespace(
         options=FillOptions(glide_iter=len(alphas)),
@@ -87,9 +89,14 @@ def asked_of(volumes, alphas):
         T=np.zeros((2, 4), np.int32),
     )
     history = SimpleNamespace(budget=SimpleNamespace(spent=False), add=lambda *_, **__: None)
-    relaxed = SimpleNamespace(relaxed=lambda x, goals, _: opened.append(goals) or x)
+
+    def relaxed(x, goals, _, elements):
+        assert elements is held_up
+        opened.append(goals)
+        return x
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(minimizing, "Relaxation", lambda _: relaxed)
+        patch.setattr(minimizing, "Relaxation", lambda _: SimpleNamespace(relaxed=relaxed))
         minimize(model, np.zeros((4, 3)), history, glide=True, start=1.0, goal=9.0, asked=volumes)
     # What single elements are opened for is what all are asked for.
     last = asked[-1] if asked else np.ones(2)
