@@ -7,6 +7,7 @@ follow. Newton steps towards areas a bounded factor away get there (chart_newton
 
 from __future__ import annotations
 
+import math
 import time
 
 import numpy as np
@@ -28,6 +29,10 @@ _LONG, _FULL = 0.5, 0.9  # steps that let the weight, the reach grow
 _NEARLY = 0.95  # share of the area within reach from which on the weight grows
 _FAIR = 0.1  # face SD the polyhedral steps can start from
 _SETTLED = 0.02  # share of the energy; a step that lowers it by less was the last
+# So many steps in a row that end above the lowest energy so far, less that share, are the last as
+# well: weights follow the areas, and both can go round in circles.
+_CIRCLING = 4
+_TAKEN_BACK = 6  # times the reach, where the weight of shape stays: it goes up and down from there
 
 
 def balance_areas(
@@ -47,6 +52,8 @@ def balance_areas(
     history: list[IterationRecord] = []
     lightest = shape or _SHAPE / _MOST_WEIGHT
     shape, reach = shape or _SHAPE, _REACH
+    lowest, since, taken_back, grows = math.inf, 0, 0, False
+    keeping = shape == lightest
     for iteration in range(1, most + 1):
         if clock is not None and clock.spent:
             break
@@ -67,9 +74,19 @@ def balance_areas(
         )
         report(progress, "area", iteration, most, face_std=measured.face_std)
         done = taken.before - taken.after < _SETTLED * taken.before
-        if taken.step == 0.0 or (taken.within > 1.0 - 1e-9 and (measured.face_std < _FAIR or done)):
+        if taken.step == 0.0:
             break
-        if taken.step > _LONG and taken.within > _NEARLY:
-            shape = max(shape / _GROWTH, lightest)
-        reach = min(2.0 * reach, _MOST_REACH) if taken.step >= _FULL else max(_REACH, 0.5 * reach)
+        if taken.within > 1.0 - 1e-9:
+            since = 0 if taken.after < (1.0 - _SETTLED) * lowest else since + 1
+            lowest = min(lowest, taken.after)
+            if done or since == _CIRCLING or measured.face_std < _FAIR:
+                break
+        if taken.step > _LONG and taken.within > _NEARLY and shape > lightest:
+            shape, lowest, since = max(shape / _GROWTH, lightest), math.inf, 0
+        if taken.step >= _FULL:
+            reach, grows = min(2.0 * reach, _MOST_REACH), True
+        else:
+            reach, taken_back, grows = max(_REACH, 0.5 * reach), taken_back + grows, False
+        if keeping and taken_back == _TAKEN_BACK:
+            break
     return newton.turns, history

@@ -225,6 +225,27 @@ def crowded_edges(solid: TetMesh, tets: NDArray[np.intp]) -> NDArray[np.int32]:
     return np.unique(own, axis=0)
 
 
+def surrounding_edges(solid: TetMesh, tets: NDArray[np.intp]) -> NDArray[np.int32]:
+    """Edges to halve so that all that is round some tets gets room, not they alone.
+
+    Parameters
+    ----------
+    solid : TetMesh
+    tets : ndarray of intp
+
+    Returns
+    -------
+    (e, 2) ndarray of int32
+        Those of each interior vertex of those tets, and of each that shares a tet with one of their
+        vertices, in lexicographic order.
+    """
+    near = np.zeros(solid.n_vertices, bool)
+    near[solid.T[tets]] = True
+    near[solid.T[near[solid.T].any(axis=1)]] = True
+    near &= solid.boundary_index < 0
+    return np.ascontiguousarray(solid.edges[near[solid.edges].any(axis=1)])
+
+
 def longest_inner_edges(
     solid: TetMesh, points: NDArray[np.float64], tets: NDArray[np.intp]
 ) -> NDArray[np.int32]:

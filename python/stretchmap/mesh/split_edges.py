@@ -51,12 +51,17 @@ def split_edges(solid: TetMesh, edges: NDArray[np.int32], shares: NDArray[np.flo
 
     wanted = keys(edges)
     order = np.argsort(wanted)
-    have = keys(solid.T[:, TET_EDGES])  # (k, 6)
+    touched = np.zeros(n, bool)
+    touched[edges] = True
+    near = np.flatnonzero(touched[solid.T].sum(axis=1) > 1)
+    have = keys(solid.T[near][:, TET_EDGES])  # (k', 6)
     place = order[np.minimum(np.searchsorted(wanted, have, sorter=order), len(order) - 1)]
     hit = np.where(wanted[place] == have, place, len(edges))
-    first = hit.min(axis=1)
+    nearest = hit.min(axis=1, initial=len(edges))
+    first = np.full(solid.n_tets, len(edges))
+    first[near] = nearest
     late = np.zeros(len(edges) + 1, bool)
-    late[hit[hit > first[:, None]]] = True
+    late[hit[hit > nearest[:, None]]] = True
     kept = np.flatnonzero(~late[:-1])
     number = np.full(len(edges) + 1, -1)
     number[kept] = n + np.arange(len(kept))

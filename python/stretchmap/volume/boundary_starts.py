@@ -6,6 +6,7 @@ import dataclasses
 import logging
 import math
 from collections.abc import Callable, Iterable, Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -123,9 +124,7 @@ class _BoundaryMaps:
         self.equal = equal_areas(surface, self.conformal, self.progress)
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
-        self.got_stuck = False
-        tori = [self.fatter_ratio * more for more in _LESS_FAT]
-        self.gentler = iter([(ratio, shape) for ratio in tori for shape in (_GENTLE, _LIGHTER)])
+        self.got_stuck = self.folded_anyway = False
 
     def progress(self, stage: str, done: int, total: int, **values: float) -> None:
         """Pass it on, unless there is no time left for what reports it."""
@@ -144,9 +143,9 @@ class _BoundaryMaps:
             # Both sides of a thin wall can get stuck in each other on one torus, not on the next.
             yield self.gentle_on_fatter
             yield self.gentle_on_fatter
+            yield self.gentle_on_fatter
             if not self.got_stuck:
                 yield self.fatter
-            yield self.gentle_on_fatter
         yield lambda: self.gentle([(self.ratio, _GENTLE)])
         yield self.folded
         yield lambda: self.after(_STEPS)
@@ -175,6 +174,7 @@ class _BoundaryMaps:
         # where that gets stuck, it leaves needles that no gliding opens again.
         found = self._turned(self.first)
         self.got_stuck = found is not None and self._not_outward(found) > 0
+        self.folded_anyway = found is None or self.got_stuck
         return None if self.got_stuck else found
 
     def folded(self) -> AreaMap | None:
@@ -182,6 +182,19 @@ class _BoundaryMaps:
 
     def fatter(self) -> AreaMap | None:
         return self._unfolded(self.fatter_ratio)
+
+    @cached_property
+    def gentler(self) -> Iterator[tuple[float, float]]:
+        """Tori, with weights of shape, that are tried in turn.
+
+        Where many faces are folded, the lighter weight takes long and mostly leaves them so; where
+        none is, it keeps areas better on the same torus.
+        """
+        tori = [self.fatter_ratio * more for more in _LESS_FAT]
+        gentle, lighter = ([(ratio, shape) for ratio in tori] for shape in (_GENTLE, _LIGHTER))
+        if self.folded_anyway:
+            return iter(gentle + lighter)
+        return iter(gentle[:2] + lighter[:2] + gentle[2:] + lighter[2:])
 
     def gentle_on_fatter(self) -> AreaMap | None:
         """Another one each time, on less and less fat tori."""

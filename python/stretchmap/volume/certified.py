@@ -27,7 +27,8 @@ _MINIMIZED = ("frozen", "glide")  # stages whose energies are comparable
 _WORTH_A_START = 0.1  # share of the time; with less left no further one is made
 # Tets stuck at most, and share of the time left, where a start that made room is gone on with
 # before another follows: nearly there, it may take much of the time yet.
-_NEARLY, _LATE = 30, 0.35
+_NEARLY, _LATE = 30, 0.2
+_QUICKER = 0.3  # times as long as one that leaves tets stuck, one that serves takes at least
 # Mean abs(ratio - 1) from which on another torus is tried, so many times thinner, if so many times
 # the time the last start took is left: where areas of the boundary fit best, what few edges round a
 # handle or a limb leave room for can be far less than what belongs there.
@@ -74,14 +75,15 @@ def certified_map(
         nonlocal left_off
         for another in itertools.chain(starts, [None]):
             if another is not None:
-                yield another
+                only = budget.left < latest  # hardly another one follows
+                yield dataclasses.replace(another, patience=1.0) if only else another
             while best is not None and _done(least):
                 thinner = _thinner(solid, options, best, budget, progress)
                 if thinner is None:
                     return
                 yield thinner
             nearly = 0 < least[1] <= _NEARLY and budget.left < _LATE * budget.seconds
-            late = nearly or budget.left < latest
+            late = nearly or budget.left < _QUICKER * latest
             if left_off is not None and (another is None or late):
                 begin, left_off = left_off, None
                 yield begin

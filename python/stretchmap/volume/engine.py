@@ -21,7 +21,7 @@ from .. import _core
 from ..base.budget import Budget
 from ..base.progress import Progress
 from ..certificate.checks import certify
-from ..mesh.refinement import crowded_edges, longest_inner_edges
+from ..mesh.refinement import crowded_edges, longest_inner_edges, surrounding_edges
 from .equalize import equalize
 from .exact_rings import make_rings_exact
 from .ground import glide_on_mesh, untangle_on_mesh
@@ -36,21 +36,23 @@ __all__ = ["solve"]
 
 _log = logging.getLogger("stretchmap")
 
-_ROUNDS, _HASTY_ROUNDS = 12, 2  # of halving edges; fewer where another start follows
-_RINGS = (2, 4, 8)  # reach of the patches, to begin with and where that does not help
+_ROUNDS, _HASTY_ROUNDS = 12, 3  # of halving edges; fewer where another start follows
+# Reach of the patches, to begin with and where that does not help; and with more vertices there.
+_RINGS, _NARROW = (2, 4, 8), (2, 4)
 # Inverted tets: with a larger share of all, it is not a matter of single places.
 _MOST_STUCK = 0.05
 _HELPED = 0.95  # of them are left at most where patches are worth another round
-# Shares of the tets for which another start is worth more than patches, and than wide ones; and of
-# those given, by which the time counts, where many had to be added.
-_HOPELESS, _WIDELY = 0.01, 0.005
-_HOPELESS_GIVEN = 0.03
+_HOPELESS = 0.02  # share of the tets for which another start is worth more than patches
 _FEW_STUCK = 30  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
-_GLIDING = 0.4  # share of the time left before the edges round stuck tets are halved instead
+# Shares of the time left before the edges round stuck tets are halved instead, and for wide patches
+# where another start follows; that much of all has to be left for those.
+_GLIDING, _WIDELY, _EARLY = 0.4, 0.15, 0.5
+_WORTH = 0.8  # share for patches in which all edges are halved: mostly those do
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
+_MOST_HALVED = 0.2  # edges halved at once, per tet
 
 # Mean abs(ratio - 1) from which on more vertices are worth their time, and how often; the tets they
 # are for have so many times the mean energy.
@@ -85,9 +87,7 @@ class _Run:
     @property
     def hopeless(self) -> bool:
         """Whether more tets are inverted than patches are going to untangle in time."""
-        n_tets, refinement = len(self.history.model.T), self.problem.refinement
-        n_given = n_tets if refinement is None else refinement.n_given_tets
-        return _inverted(self) > min(_HOPELESS * n_tets, _HOPELESS_GIVEN * n_given)
+        return _inverted(self) > _HOPELESS * len(self.history.model.T)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -202,26 +202,28 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     if glide and len(stuck):
         run.x = opened = untangle_whole(history.model, run.x, history, glide=True).x
         stuck = _patched(run, glide=True)
-    best, fewest, least = run.problem, len(stuck), _inverted(run)
+    best, fewest, least, edges = run.problem, stuck, _inverted(run), crowded_edges
     for _ in range(_ROUNDS):
         if not len(stuck) or run.problem.refinement is None or history.budget.spent:
             break
-        if len(stuck) > min(_MOST_STUCK * run.problem.solid.n_tets, _TIMES * fewest + _MORE):
+        if len(stuck) > min(_MOST_STUCK * run.problem.solid.n_tets, _TIMES * len(fewest) + _MORE):
             break
         if not _inverted(run):
             break  # folded faces are left, which more vertices inside do not unfold
-        n = run.problem.solid.n_vertices
-        run.take(run.problem.halved(crowded_edges(run.problem.solid, stuck)))
-        _log.info(
-            "%d inverted tets are stuck: %d edges round them halved",
-            len(stuck), run.problem.solid.n_vertices - n,
-        )  # fmt: skip
+        halved = edges(run.problem.solid, stuck)
+        if len(halved) > _MOST_HALVED * run.problem.solid.n_tets:
+            break
+        run.take(run.problem.halved(halved))
+        _log.info("%d inverted tets are stuck: %d edges round them halved", len(stuck), len(halved))
         stuck = _patched(run, glide=glide)
         # Folded faces can be held, inverted tets cannot.
         inverted = _inverted(run)
-        if (inverted, len(stuck)) < (least, fewest):
-            best, fewest, least = run.problem, len(stuck), inverted
-    if fewest and len(stuck):
+        if (inverted, len(stuck)) < (least, len(fewest)):
+            best, fewest, least = run.problem, stuck, inverted
+        elif edges is crowded_edges and inverted > least:  # as in `_untangled_halved`
+            run.take(best)
+            stuck, edges = fewest, surrounding_edges
+    if len(fewest) and len(stuck):
         run.take(best)
         if least or not glide:
             return least
@@ -264,6 +266,9 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         more = run.budget.share(_NEARLY)
         history.budget = more if more.left > history.budget.left else history.budget
         stuck = _untangled_halved(run, stuck)
+    early = run.budget.left > _EARLY * run.budget.seconds
+    if run.hasty and early and glide and 0 < len(stuck) <= _FEW_STUCK:
+        stuck = _patched_gliding(run, stuck, rings=_RINGS[-1:], share=_WIDELY)
     if not len(stuck):
         return stuck
     if run.on_mesh and _freed(run):
@@ -280,29 +285,46 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
 
 
 def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Few stuck tets untangled with the edges round them halved, or left as they are."""
-    before, left = run.problem, stuck
+    """Few stuck tets untangled with edges round them halved, or left as they are.
+
+    First those by which they hang on the boundary. Where that breeds more than it cures, all in
+    their surroundings: a vertex that sees less of the boundary still has to see all of its star,
+    and that gets room only where the stars next to it do.
+    """
+    before, left, edges = run.problem, stuck, crowded_edges
     for _ in range(_HASTY_ROUNDS if run.hasty else _ROUNDS):
         if before.refinement is None or not 0 < len(left) <= _FEW_STUCK:
             break
         if run.history.budget.spent:
             break
-        run.take(run.problem.halved(crowded_edges(run.problem.solid, left)))
-        left = _patched(run, glide=False, few=_FEW_STUCK)
-        if 0 < len(left) <= _FEW_STUCK:
-            left = _patched_gliding(run, left)
+        last = run.problem
+        run.take(last.halved(edges(last.solid, left)))
+        if edges is crowded_edges:
+            now = _patched(run, glide=False, few=_FEW_STUCK)
+            if len(now) > len(left):
+                run.take(last)
+                edges = surrounding_edges
+                continue
+        else:
+            now = stuck_tets(run.history.model, run.x, glide=False)
+        left = _patched_gliding(run, now, rings=_NARROW, share=_WORTH) if len(now) else now
     if not len(left):
         return left
     run.take(before)
     return stuck
 
 
-def _patched(run: _Run, *, glide: bool, few: int = 0) -> NDArray[np.intp]:
-    """Untangle patches as long as that helps, and then larger ones if more than a few are left."""
+def _patched(
+    run: _Run, *, glide: bool, few: int = 0, rings: tuple[int, ...] = ()
+) -> NDArray[np.intp]:
+    """Untangle patches as long as that helps, and then larger ones if more than a few are left.
+
+    Those cost as much as another start, which serves more often: where one follows, it comes first.
+    """
     model, budget = run.history.model, run.history.budget
     stuck = stuck_tets(model, run.x, glide=glide)
-    rings = iter(_RINGS)
-    reach = next(rings)
+    wider = iter(rings or (_RINGS[:1] if run.hasty else _RINGS))
+    reach = next(wider)
     while 0 < len(stuck) <= _MOST_STUCK * len(model.T) and not budget.spent:
         x = untangle_patches(model, run.x, stuck, rings=reach, glide=glide, budget=budget)
         left = stuck_tets(model, x, glide=glide)
@@ -312,23 +334,23 @@ def _patched(run: _Run, *, glide: bool, few: int = 0) -> NDArray[np.intp]:
             run.x, stuck = x, left
         if helped:
             continue
-        larger = next(rings, None)
+        larger = next(wider, None)
         if larger is None or len(stuck) <= few:
             break
-        if run.hasty and len(stuck) > _WIDELY * len(model.T):
-            break
-        reach = larger if gained else next(rings, larger)  # all or nothing
+        reach = larger if gained else next(wider, larger)  # all or nothing
     return stuck
 
 
-def _patched_gliding(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
+def _patched_gliding(
+    run: _Run, stuck: NDArray[np.intp], *, rings: tuple[int, ...] = (), share: float = _GLIDING
+) -> NDArray[np.intp]:
     """Few stuck tets untangled with the boundary round them gliding; inverted tets that are left.
 
     Where a coarse boundary pins them, no vertex inside has a place from where it sees all of it.
     """
     x, history = run.x, run.history
-    whole, history.budget = history.budget, history.budget.share(_GLIDING)
-    _patched(run, glide=True)
+    whole, history.budget = history.budget, history.budget.share(share)
+    _patched(run, glide=True, rings=rings)
     history.budget = whole
     left = stuck_tets(history.model, run.x, glide=False)
     if len(left) < len(stuck):

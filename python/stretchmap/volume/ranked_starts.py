@@ -46,6 +46,13 @@ class Start:
     resumed: bool = False  # whether it is one that did
 
     @property
+    def ratio(self) -> float:
+        """R / r of the torus."""
+        torus = self.map.torus
+        assert torus is not None
+        return torus.ratio
+
+    @property
     def inverted(self) -> float:
         """Share of the tets that the harmonic map turns over."""
         volumes = _core.mesh.tet_volumes(self.problem.x, self.problem.solid.T)
@@ -97,6 +104,8 @@ def _best_first(starts: Iterator[Start], budget: Budget) -> Iterator[Start]:
             made = left - allowed.left
         if len(few) > 1:
             few.sort(key=lambda start: start.inverted)
+            # What gets stuck on one torus mostly does so on the same from another start.
+            few[1:] = sorted(few[1:], key=lambda start: start.ratio == few[0].ratio)
             few[0] = replace(few[0], others=time.perf_counter() - clock)
     least = few[0].inverted
     beaten = [start for start in few[1:] if start.inverted > max(_MANY, least / _CLEARLY)]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from stretchmap import _core, samples
-from stretchmap.mesh.refinement import crowded_edges, refine_overconstrained
+from stretchmap.base.budget import Budget
+from stretchmap.mesh.refinement import crowded_edges, refine_overconstrained, surrounding_edges
+from stretchmap.volume import engine
 from stretchmap.volume.engine import solve
 from stretchmap.volume.options import FillOptions
 from stretchmap.volume.problem import VolumeProblem
@@ -90,3 +93,54 @@ def test_halved_edges_leave_the_way_back(bolt, refinement):
     np.testing.assert_allclose(shares, source.tet_volumes, rtol=1e-12)
     rows = [np.unique(np.sort(mesh.surface.F, axis=1), axis=0) for mesh in (new, source)]
     np.testing.assert_array_equal(*rows)
+
+
+def test_edges_that_surround_tets_are_all_those_of_vertices_inside_next_to_them():
+    solid = samples.solid_torus(3000)
+    inside = set(range(solid.n_vertices)) - set(solid.boundary_vertices.tolist())
+    for tets in ([5], [5, 700, 2100]):
+        corners = set(solid.T[tets].ravel().tolist())
+        near = {v for tet in solid.T.tolist() if corners & set(tet) for v in tet} & inside
+        expected = [tuple(e) for e in solid.edges.tolist() if near & set(e)]
+        found = [tuple(e) for e in surrounding_edges(solid, np.array(tets)).tolist()]
+        assert found == expected
+        assert {tuple(e) for e in crowded_edges(solid, np.array(tets)).tolist()} <= set(found)
+
+
+@pytest.mark.parametrize("breeds", [False, True])
+def test_where_halving_breeds_stuck_tets_all_round_them_is_halved_instead(monkeypatch, breeds):
+    """One stuck tet: of three with edges to the boundary halved, none with all those near it."""
+    asked: list[str] = []
+    state = {"halved": ""}
+
+    class Problem:
+        refinement, solid = object(), None
+
+        def halved(self, edges):
+            state["halved"] = edges
+            return Problem()
+
+    def take(problem):
+        run.problem = problem
+
+    def some(name):
+        return lambda solid, tets: asked.append(name) or name
+
+    def left(*_, **__):
+        state["halved"], now = "", state["halved"]
+        if now == "crowded":
+            return np.arange(3 if breeds else 0)
+        return np.arange(0)
+
+    run = SimpleNamespace(
+        problem=Problem(), take=take, hasty=True, x=None,
+        history=SimpleNamespace(budget=Budget(9.0), model=None),
+    )  # fmt: skip
+    given = run.problem
+    monkeypatch.setattr(engine, "crowded_edges", some("crowded"))
+    monkeypatch.setattr(engine, "surrounding_edges", some("surrounding"))
+    for name in ("_patched", "_patched_gliding", "stuck_tets"):
+        monkeypatch.setattr(engine, name, left)
+    assert not len(engine._untangled_halved(run, np.arange(1)))
+    assert asked == ["crowded", "surrounding"][: 1 + breeds]
+    assert run.problem is not given

@@ -68,19 +68,47 @@ def order(monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int 
         # Nobody serves: the best is gone on with.
         ({"a": 40, "b": 3, "c": 9}, [0.9, 0.8, 0.7, 0.6], 0, "abcB"),
         # Nearly there, and late: before another start.
-        ({"a": 4, "b": 9, "c": 2}, [0.7, 0.3, 0.2], 0, "abA"),
+        ({"a": 4, "b": 9, "c": 2}, [0.7, 0.19, 0.1], 0, "abA"),
         # Late, but far from it: others first.
-        ({"a": 400, "b": 900, "c": 31}, [0.6, 0.34, 0.2, 0.15], 0, "abcC"),
-        # No more time than the last one took: the best so far is gone on with.
-        ({"a": 400, "b": 900, "c": 31}, [0.7, 0.25, 0.2], 0, "abA"),
+        ({"a": 400, "b": 900, "c": 31}, [0.6, 0.19, 0.15, 0.12], 0, "abcC"),
+        # Less time than one that serves may take, where others took so long: the best so far.
+        ({"a": 400, "b": 900, "c": 31}, [0.9, 0.2, 0.15], 0, "abA"),
         # Gone on with in vain, once only: then the others.
-        ({"a": 4, "b": 9, "c": 6}, [0.3, 0.25, 0.2, 0.15], 4, "aAbc"),
+        ({"a": 4, "b": 9, "c": 6}, [0.19, 0.18, 0.17, 0.15], 4, "aAbc"),
         # No time for any other.
         ({"a": 4, "b": 9}, [0.05], 0, "a"),
     ],
 )
 def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, expected) -> None:
     assert "".join(order(monkeypatch, stuck, left, kept)) == expected
+
+
+def test_one_after_which_hardly_another_follows_may_take_all_the_time(monkeypatch) -> None:
+    patience: list[float] = []
+    budget = SimpleNamespace(seconds=1.0, left=1.0)
+
+    def starts(*_: Any, **__: Any) -> Any:
+        for _ in range(3):
+            yield Start(SimpleNamespace(), SimpleNamespace(held=()), patience=0.5, hasty=True)
+
+    def solve(problem: Any, *_: Any, **options: Any) -> Outcome:
+        patience.append(options["patience"])
+        budget.left -= 0.3
+        return Outcome(problem, (), True, "40", {"start": 0.0})
+
+    monkeypatch.setattr(certified.Budget, "of", lambda *_: budget)
+    monkeypatch.setattr(certified, "ranked_starts", starts)
+    monkeypatch.setattr(certified, "solve", solve)
+    monkeypatch.setattr(certified, "volume_result", lambda o, *_: Found(int(o.stop_reason)))
+    solid = SimpleNamespace(n_tets=1000)
+    certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
+    budget.left = 1.0
+    assert patience[:2] == [0.5, 0.5]
+    monkeypatch.setattr(certified, "solve", lambda *a, **k: solve(*a, **k))
+    patience.clear()
+    budget.left = 0.55
+    certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
+    assert patience[:2] == [0.5, 1.0]
 
 
 @pytest.mark.parametrize(

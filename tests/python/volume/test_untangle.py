@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -197,7 +196,7 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
     def halved():
         return run.problem.solid.n_vertices > begun.n_vertices
 
-    def patched(run, *, glide, few=0):
+    def patched(run, *, glide, few=0, rings=()):
         return np.arange(0 if cured and halved() else stuck)
 
     def whole(model, x, history, *, glide, thorough=False, hasty=False, from_afar=False):
@@ -245,7 +244,7 @@ def test_a_start_gone_on_with_begins_with_patches(monkeypatch, resumed):
         done.append("thorough" if thorough else "whole")
         return Untangled(x, 300, -1.0)
 
-    def patched(run, *, glide, few=0):
+    def patched(run, *, glide, few=0, rings=()):
         done.append("patches")
         return np.arange(300)
 
@@ -255,14 +254,11 @@ def test_a_start_gone_on_with_begins_with_patches(monkeypatch, resumed):
     assert done == [*([] if resumed else ["whole"]), "patches", "thorough", "patches"]
 
 
-def test_where_many_tets_were_added_fewer_inverted_ones_are_hopeless(monkeypatch):
+@pytest.mark.parametrize(("share", "hopeless"), [(0.015, False), (0.025, True)])
+def test_with_more_than_a_fiftieth_inverted_another_start_is_better(monkeypatch, share, hopeless):
     run = run_of(sm.samples.bumpy_torus(600))
-    n = run.problem.solid.n_tets
-    added = SimpleNamespace(n_given_tets=n // 10)
-    monkeypatch.setattr(engine, "_inverted", lambda run: int(0.008 * n))
-    assert not run.hopeless
-    run.problem = dataclasses.replace(run.problem, refinement=added)
-    assert run.hopeless
+    monkeypatch.setattr(engine, "_inverted", lambda run: int(share * run.problem.solid.n_tets))
+    assert run.hopeless == hopeless
 
 
 @pytest.mark.parametrize("left", [30, 110, 130])
@@ -296,7 +292,7 @@ def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck
         done.append("thorough" if thorough else "whole")
         return Untangled(x, stuck, -1.0)
 
-    def patched(run, *, glide, few=0):
+    def patched(run, *, glide, few=0, rings=()):
         done.append("gliding" if glide else "patches")
         return np.arange(stuck)
 
@@ -310,7 +306,8 @@ def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck
     assert len(engine._untangle_inside(run, glide=True)) == stuck
     # Of few the boundary round them may glide, and they get more vertices, but not for as long as
     # another start may take.
-    patches = [] if hopeless else ["patches"] if stuck == 300 else 3 * ["patches", "gliding"]
+    few = [*(4 * ["patches", "gliding"]), "gliding"]  # once more, wide, while it is early
+    patches = [] if hopeless else ["patches"] if stuck == 300 else few
     assert done == ["whole", *patches]
     monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(stuck))
     assert engine._untangle(run, glide=True) == stuck  # nothing else is tried either
@@ -322,7 +319,7 @@ def test_the_boundary_gives_way_round_few_stuck_tets_if_that_helps(monkeypatch, 
     run = run_of(sm.samples.bumpy_torus(600))
     before = run.x
 
-    def patched(run, *, glide):
+    def patched(run, *, glide, rings=()):
         assert glide
         run.x = run.x + 1.0
         return np.arange(left)
@@ -360,6 +357,5 @@ def test_patches_reach_further_where_they_hardly_help(monkeypatch, left, rings):
     assert reached == [two for two in rings if two == 2]
     reached.clear()
     run.x = np.full(run.x.shape, 200.0)
-    monkeypatch.setattr(engine, "_WIDELY", 201 / run.problem.solid.n_tets)
-    engine._patched(run, glide=False)
-    assert reached == rings
+    engine._patched(run, glide=False, rings=(8,))
+    assert reached == [8] * (1 if left == 200 else 4)
