@@ -124,7 +124,7 @@ class _BoundaryMaps:
         self.equal = equal_areas(surface, self.conformal, self.progress)
         self.ratio: Ratio | float = options.ratio or "search"
         self.first = self._chart(self.ratio)
-        self.got_stuck = self.folded_anyway = False
+        self.got_stuck = self.stays_folded = False
 
     def progress(self, stage: str, done: int, total: int, **values: float) -> None:
         """Pass it on, unless there is no time left for what reports it."""
@@ -174,7 +174,7 @@ class _BoundaryMaps:
         # where that gets stuck, it leaves needles that no gliding opens again.
         found = self._turned(self.first)
         self.got_stuck = found is not None and self._not_outward(found) > 0
-        self.folded_anyway = found is None or self.got_stuck
+        self.stays_folded = found is None or self.got_stuck
         return None if self.got_stuck else found
 
     def folded(self) -> AreaMap | None:
@@ -192,7 +192,7 @@ class _BoundaryMaps:
         """
         tori = [self.fatter_ratio * more for more in _LESS_FAT]
         gentle, lighter = ([(ratio, shape) for ratio in tori] for shape in (_GENTLE, _LIGHTER))
-        if self.folded_anyway:
+        if self.stays_folded:
             return iter(gentle + lighter)
         return iter(gentle[:2] + lighter[:2] + gentle[2:] + lighter[2:])
 

@@ -83,12 +83,13 @@ def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, 
     assert "".join(order(monkeypatch, stuck, left, kept)) == expected
 
 
-def test_one_after_which_hardly_another_follows_may_take_all_the_time(monkeypatch) -> None:
+@pytest.mark.parametrize(("left", "expected"), [(1.0, 0.5), (0.55, 1.0)])
+def test_one_after_which_hardly_another_follows_may_take_all_the_time(monkeypatch, left, expected):
     patience: list[float] = []
-    budget = SimpleNamespace(seconds=1.0, left=1.0)
+    budget = SimpleNamespace(seconds=1.0, left=left)
 
     def starts(*_: Any, **__: Any) -> Any:
-        for _ in range(3):
+        for _ in range(2):
             yield Start(SimpleNamespace(), SimpleNamespace(held=()), patience=0.5, hasty=True)
 
     def solve(problem: Any, *_: Any, **options: Any) -> Outcome:
@@ -102,13 +103,7 @@ def test_one_after_which_hardly_another_follows_may_take_all_the_time(monkeypatc
     monkeypatch.setattr(certified, "volume_result", lambda o, *_: Found(int(o.stop_reason)))
     solid = SimpleNamespace(n_tets=1000)
     certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
-    budget.left = 1.0
-    assert patience[:2] == [0.5, 0.5]
-    monkeypatch.setattr(certified, "solve", lambda *a, **k: solve(*a, **k))
-    patience.clear()
-    budget.left = 0.55
-    certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
-    assert patience[:2] == [0.5, 1.0]
+    assert patience[:2] == [0.5, expected]
 
 
 @pytest.mark.parametrize(

@@ -267,7 +267,7 @@ def test_the_first_torus_on_which_kept_shapes_have_no_fold(monkeypatch, outward,
     monkeypatch.setattr(boundary_starts_module, "turned", lambda one, _: turned.append(one) or one)
     monkeypatch.setattr(maps, "fatter_ratio", 1.5)
     made = maps(SOLID.surface, VolumeOptions(), None)
-    made.folded_anyway = not unfolds  # then the lighter weight of shape is dear: it comes last
+    made.stays_folded = not unfolds  # then the lighter weight of shape is dear: it comes last
     monkeypatch.setattr(maps, "_chart", charts(outward=outward))
     monkeypatch.setattr(maps, "_not_outward", lambda _, found: found.folded)
     pairs = PAIRS[not unfolds]
