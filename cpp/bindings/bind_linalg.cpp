@@ -53,6 +53,8 @@ void bind(py::module_& m) {
         return normal_matrix(A, weights);
       },
       py::arg("A").noconvert(), py::arg("weights").noconvert(), release_gil());
+  m.def("solve_dense", &solve_dense, py::arg("A").noconvert(), py::arg("b").noconvert(),
+        release_gil());
 }
 
 }  // namespace stretchmap::linalg

@@ -3,7 +3,7 @@ import numpy
 import numpy.typing
 import scipy.sparse
 import typing
-__all__: list[str] = ['SolveReport', 'SpdSolver', 'normal_matrix']
+__all__: list[str] = ['SolveReport', 'SpdSolver', 'normal_matrix', 'solve_dense']
 class SolveReport:
     @property
     def converged(self) -> bool:
@@ -28,4 +28,6 @@ class SpdSolver:
     def backend(self) -> str:
         ...
 def normal_matrix(A: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], weights: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    ...
+def solve_dense(A: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.c_contiguous"], b: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...

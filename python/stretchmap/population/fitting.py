@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..mesh.meshes import TetMesh, TriMesh
-from .thin_plate import ThinPlate, solve_dense
+from .thin_plate import ThinPlate
 
 __all__ = ["Anchors", "Fit", "Template", "fit_surface"]
 
@@ -243,7 +243,7 @@ class _Equations:
 
     def solution(self) -> Array:
         n = 3 * self.size
-        solved = solve_dense(self.matrix.reshape(n, n), self.right.ravel())
+        solved = _core.linalg.solve_dense(self.matrix.reshape(n, n), self.right.ravel())
         return np.ascontiguousarray(solved.reshape(3, self.size).T)
 
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from .. import _core
-
-__all__ = ["ThinPlate", "solve_dense"]
+__all__ = ["ThinPlate"]
 
 Array = NDArray[np.float64]
 
@@ -65,13 +62,6 @@ class ThinPlate:
         scaled = (points - self.center) / self.length
         kernel = -cdist(scaled, self.sites) @ self.projector
         return np.column_stack([np.ones(len(scaled)), scaled, kernel])
-
-
-def solve_dense(matrix: Array, right: Array) -> Array:
-    """Solution of a positive definite system, the same bits whatever the threads of BLAS."""
-    solver = _core.linalg.SpdSolver(sp.csr_matrix(matrix), "direct")
-    solution, _ = solver.solve(right[:, None], np.zeros((len(right), 1)))
-    return np.asarray(solution[:, 0])
 
 
 def _far_apart(points: Array, count: int) -> NDArray[np.intp]:

@@ -46,4 +46,8 @@ Rows weighted_gram(const Rows& A, const VecRef& weights);
 // the same bits.
 Rows normal_matrix(const RowsRef& A, const VecRef& weights);
 
+// The solution of a positive definite system. All processors and numbers of threads give the same
+// bits.
+Vec solve_dense(const RowsRef& A, const VecRef& b);
+
 }  // namespace stretchmap::linalg

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stretchmap/base/clones.hpp"
+#include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/parallel.hpp"
 #include "stretchmap/linalg/symmetric.hpp"
 
@@ -192,6 +193,28 @@ Rows normal_matrix(const RowsRef& A, const VecRef& weights) {
          negative.data());
   product.triangularView<Eigen::StrictlyLower>() = product.transpose();
   return product;
+}
+
+Vec solve_dense(const RowsRef& A, const VecRef& b) {
+  const Index n = static_cast<Index>(A.rows());
+  if (A.cols() != n || b.size() != n) throw Error("SolverError", "A must be square, as long as b");
+  Eigen::MatrixXd L = A.transpose();  // its columns are those of A, of which rows are given
+  const Index failed = eliminate_front(L.data(), nullptr, n, n);
+  if (failed >= 0 || !(L.diagonal().minCoeff() > 0.0))
+    throw Error("SolverError", "the matrix is not positive definite");
+  const Vec pivots = L.diagonal();
+  L.diagonal().setOnes();
+  Vec x = Vec::Zero(n);
+  for (int pass = 0; pass < 2; ++pass) {  // once more for what rounding left
+    Vec rest = b;
+    for (Index j = 0; j < n; ++j) rest -= x(j) * A.row(j).transpose();
+    for (Index j = 0; j < n; ++j) rest.tail(n - j - 1) -= rest(j) * L.col(j).tail(n - j - 1);
+    rest.array() /= pivots.array();
+    for (Index j = n; j-- > 0;)
+      for (Index i = j + 1; i < n; ++i) rest(j) -= L(i, j) * rest(i);
+    x += rest;
+  }
+  return x;
 }
 
 }  // namespace stretchmap::linalg
