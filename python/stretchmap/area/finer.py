@@ -40,7 +40,10 @@ _log = logging.getLogger("stretchmap")
 
 _SAG = 1.0  # most sag of an edge, over the heights its faces are to have above it
 _FAR, _MANY = 2.0, 0.005  # more than this share of the edges with more sag than that: too coarse
-_GROWTH, _SPARE = 2.5, 12_000  # most faces: so many times those of the input, and so many more
+# Faces there may be: so many times those of the input, and so many more; up to twice as many times
+# where work is left for so many steps, to begin with and after each approach.
+_GROWTH, _SPARE = 2.5, 12_000
+_MOST_GROWTH, STEPS_LEFT = 5.0, (60, 50, 40, 30)
 _BENT = 0.5  # least share of its area that a face may keep when the flat chart is bent
 _PASSES = 14
 _MORE = 3  # times as many faces that look inward as before: halving edges does not help
@@ -82,12 +85,23 @@ def _slender(surface: TriMesh) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Finer:
-    """Angles of a surface with edges halved, and how it came about."""
+    """Angles of a surface with edges halved, and how it came about.
+
+    Attributes
+    ----------
+    level : Level
+    angles : ndarray, shape (n, 2)
+    ratio : float
+    added : SurfaceRefinement
+    affordable : int
+        Faces with which work is left for what follows.
+    """
 
     level: Level
     angles: NDArray[np.float64]
     ratio: float
     added: SurfaceRefinement
+    affordable: int = 0
 
     @classmethod
     def of(cls, level: Level, angles: NDArray[np.float64], ratio: float) -> Finer:
@@ -165,7 +179,7 @@ class Finer:
         shifts = np.rint((corners - angles[done.surface.F]) / TWO_PI).astype(np.int32)
         forms = forms_of(done.surface, shifts[..., 0], shifts[..., 1])
         finer = Level.of(done.surface, angles / TWO_PI, forms, level.aspect)
-        return Finer(finer, angles, self.ratio, self.added.after(done))
+        return Finer(finer, angles, self.ratio, self.added.after(done), self.affordable)
 
     def fitted(self, sag: float, share: float = 1.0) -> Finer | None:
         """With edges halved until none sags too much; None if that takes too many faces.
@@ -225,7 +239,7 @@ class Finer:
     ) -> tuple[Finer, Pace, list[IterationRecord]]:
         """With areas nearly right, edges that sag too much meanwhile halved, too; pace, records."""
         finer, pace, history = self, Pace(), []
-        for most in _APPROACH:
+        for most, after in zip(_APPROACH, STEPS_LEFT[1:], strict=True):
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
             work.begin(newton, n_faces)
             affordable = work.steps(n_faces) - _LEAST_STEPS
@@ -235,7 +249,7 @@ class Finer:
             pace = max(pace, reached, key=lambda each: each.weight)
             work.spend_on_approach(len(records), n_faces)
             history += records
-            finer = replace(finer, angles=newton.angles)
+            finer = replace(finer, angles=newton.angles, affordable=work.most_faces(after))
             error = newton.measures().face_std
             if error > _LOST:
                 break
@@ -278,7 +292,9 @@ class Finer:
     def too_many(self, more: int, share: float = 1.0) -> bool:
         """Whether so many vertices more make more faces than may be, or than that share of them."""
         n_faces = len(self.added.parent_face)
-        return n_faces + 2 * more > share * (_GROWTH * n_faces * self.share + _SPARE)
+        given = n_faces * self.share
+        most = min(max(_GROWTH * given + _SPARE, self.affordable), _MOST_GROWTH * given + _SPARE)
+        return n_faces + 2 * more > share * most
 
 
 def mapped_finer(
@@ -365,7 +381,7 @@ def mapped_finer(
         )
         work.spend(len(records), n_faces)
         history += records
-        finer = Finer(finer.level, newton.angles, finer.ratio, finer.added)
+        finer = replace(finer, angles=newton.angles, affordable=work.most_faces(STEPS_LEFT[-1]))
         measured = newton.measures()
         if with_rings and worth_rings(measured, asked.tol):
             work.spend_on_rings(n_faces)

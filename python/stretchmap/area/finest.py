@@ -11,7 +11,7 @@ from ..base.progress import Progress
 from ..base.torus import TWO_PI, Torus
 from ..errors import SolverError
 from .coarse import Level
-from .finer import ROUND_STEPS, Finer, goal, mapped_finer
+from .finer import ROUND_STEPS, STEPS_LEFT, Finer, goal, mapped_finer
 from .finish import cut_short, finish_areas
 from .result import AreaMap, mapped, moved, n_folded
 from .route import EASING, EqualAreas, Made, Route, best_turns, follow
@@ -110,7 +110,9 @@ class Finest:
             work.spend_in_chart(len(more))
             given = (self.route.phase, self.route.ratio)
             phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
-            finer = Finer.wrapped(level, turns, phase, ratio).fitted(_COARSELY, _AT_ONCE)
+            wrapped = Finer.wrapped(level, turns, phase, ratio)
+            wrapped = dataclasses.replace(wrapped, affordable=work.most_faces(STEPS_LEFT[0]))
+            finer = wrapped.fitted(_COARSELY, _AT_ONCE)
             work.spend_on_fitting((finer.level.surface if finer else level.surface).n_faces)
             if finer is not None:
                 seconds = {"sem": time.perf_counter() - clock}

@@ -148,9 +148,9 @@ def area_map(
     it, further where that takes too many faces. Newton steps that let faces look inward lead to
     nearly right areas, edges that sag too much by then are halved, too, as are those of faces left
     looking inward; then the steps above follow. Where areas stay off, the edges that sag most in
-    faces that are off are halved, three times at most. All steps together cost no more than some
-    four hundred on the surface itself, more on one of less than 4,000 faces, and no more than
-    ``time_limit``.
+    faces that are off are halved, three times at most. There become no more than five times as many
+    faces, and 12,000. All steps together cost no more than some seven hundred on the surface
+    itself, more on one of less than 4,000 faces, and no more than ``time_limit``.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.

@@ -12,7 +12,7 @@ from ..mesh.surfaces import TriMesh
 
 # In units of what a face adds to a step besides its share of the elimination: so many a face of
 # the surface given, and no fewer than those.
-_EACH, _LEAST = 760.0, 3e6
+_EACH, _LEAST = 1200.0, 5e6
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
 _UNREFINED = 40  # steps where edges can be halved after them
@@ -120,6 +120,16 @@ class Work:
         units, in_time = min(max(left, least * cost), most * cost), self._in_time()
         self.hurried = self.hurried or in_time < units
         return max(int(min(units, in_time) / cost + 1e-9), 0)
+
+    def most_faces(self, steps: int) -> int:
+        """Those of the largest surface on which so many steps, one at least, can be afforded."""
+        few, many = 0, 1
+        while self.steps(many) >= steps:
+            few, many = many, 2 * many
+        while many - few > 1:
+            middle = (few + many) // 2
+            few, many = (middle, many) if self.steps(middle) >= steps else (few, middle)
+        return few
 
     def late(self) -> bool:
         """Whether what time is left is for the certificate."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 
 import numpy as np
+import pytest
 
 import stretchmap as sm
 from small_handles import eased, inward_faces, small_handle, start_of
@@ -94,11 +96,29 @@ def test_steps_are_counted_by_their_faces() -> None:
     left = work.steps()
     work.spend_in_chart(10)
     assert left - 10 < work.steps() < left
-    work.spend(600)
+    work.spend(left)
     assert work.steps() == 0 and work.steps(least=10) == 10 and not work.hurried
     small = sm.samples.torus_surface()
     unrefined = Work.of(small, Budget(np.inf), refine=False)
     assert unrefined.most == unrefined.steps() > most
+
+
+def test_faces_may_be_so_many_that_steps_are_left() -> None:
+    work = Work.of(sm.samples.torus_surface(100, 80), Budget(np.inf), refine=True)
+    for steps in (1, 60, 1000):
+        most = work.most_faces(steps)
+        assert work.steps(most) >= steps > work.steps(most + 1)
+    work.spend(work.steps())
+    assert work.most_faces(60) < 1000 and not work.hurried
+
+
+@pytest.mark.parametrize(("affordable", "most"), [(0, 52_000), (60_000, 60_000), (10**6, 92_000)])
+def test_faces_become_more_where_steps_are_left(affordable: int, most: int) -> None:
+    start = start_of(sm.samples.torus_surface(100, 80))
+    assert start.level.surface.n_faces == 16_000
+    start = dataclasses.replace(start, affordable=affordable)
+    assert not start.too_many((most - 16_000) // 2) and start.too_many((most - 16_000) // 2 + 1)
+    assert start.too_many((most - 16_000) // 2, 0.9)
 
 
 def test_work_counts_what_elimination_takes() -> None:
