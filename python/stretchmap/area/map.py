@@ -206,7 +206,7 @@ def _found(
     refine = refine and len(stack) == 1
     work = Work.of(surface, budget, refine=refine)
     found = Finest(route, stack, equal, torus, work, progress).found(refine=refine)
-    if not (work.hurried and cut_short(found.stop_reason)):
+    if not (work.out_of_time() and cut_short(found.stop_reason)):
         return found
     return dataclasses.replace(
         found, stop_reason=f"the time limit was reached; {found.stop_reason}"

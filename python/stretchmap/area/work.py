@@ -22,6 +22,7 @@ _CHART, _LOOSE, _FITTING, RINGS = 0.6, 0.9, 3, 8
 _ONCE = 0.8  # of what a face adds to a step, where its system is solved more than once
 _TOLD = 0.02  # of all the time; steps that took as long tell how long others will take
 _KEPT = 0.05  # of it, for the certificate
+_OVER = 0.2  # of it, with which too few steps can be afforded
 
 
 def _whole(n_faces: int) -> float:
@@ -45,8 +46,6 @@ class Work:
     clock : Budget
     reserved : float
         Share of all that is left for what follows should this lead nowhere.
-    hurried : bool
-        Whether time has allowed fewer steps than units did.
     """
 
     n_faces: int
@@ -54,7 +53,6 @@ class Work:
     most: int
     clock: Budget = field(default_factory=lambda: Budget(math.inf))
     reserved: float = 0.0
-    hurried: bool = False
     _flops: float = _TYPICAL  # of the surfaces seen last
     _begun: float | None = None
     _newton: _core.area.SurfaceNewton | None = None  # whose steps have begun
@@ -117,9 +115,8 @@ class Work:
         """
         cost = self._cost(n_faces or self.n_faces)
         left = self.left - self.reserved * _whole(self.n_faces)
-        units, in_time = min(max(left, least * cost), most * cost), self._in_time()
-        self.hurried = self.hurried or in_time < units
-        return max(int(min(units, in_time) / cost + 1e-9), 0)
+        units = min(max(left, least * cost), most * cost)
+        return max(int(min(units, self._in_time()) / cost + 1e-9), 0)
 
     def most_faces(self, steps: int) -> int:
         """Those of the largest surface on which so many steps, one at least, can be afforded."""
@@ -133,9 +130,11 @@ class Work:
 
     def late(self) -> bool:
         """Whether what time is left is for the certificate."""
-        late = self.clock.left < _KEPT * self.clock.seconds
-        self.hurried = self.hurried or late
-        return late
+        return self.clock.left < _KEPT * self.clock.seconds
+
+    def out_of_time(self) -> bool:
+        """Whether it is time that has run out, and not units."""
+        return self.clock.left < _OVER * self.clock.seconds and self._in_time() < self.left
 
     def _cost(self, n_faces: int) -> float:
         """Of a step."""

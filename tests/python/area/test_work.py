@@ -39,7 +39,7 @@ def test_steps_end_when_it_is_late() -> None:
         records, _, reason = finish_areas(start.newton(), False, steps, None, None, late)
         assert len(records) == most and "most steps done" in reason
     work = Work.of(surface, Budget(10.0), refine=True)
-    assert not work.late() and not work.hurried
+    assert not work.late() and not work.out_of_time()
     work.clock = Budget(0.0)
     assert Work.of(surface, Budget(np.inf), refine=True).late() is False
     equal = equal_areas(surface, sm.conformal_map(surface), None, Budget(0.0))
@@ -97,7 +97,7 @@ def test_steps_are_counted_by_their_faces() -> None:
     work.spend_in_chart(10)
     assert left - 10 < work.steps() < left
     work.spend(left)
-    assert work.steps() == 0 and work.steps(least=10) == 10 and not work.hurried
+    assert work.steps() == 0 and work.steps(least=10) == 10 and not work.out_of_time()
     small = sm.samples.torus_surface()
     unrefined = Work.of(small, Budget(np.inf), refine=False)
     assert unrefined.most == unrefined.steps() > most
@@ -109,7 +109,7 @@ def test_faces_may_be_so_many_that_steps_are_left() -> None:
         most = work.most_faces(steps)
         assert work.steps(most) >= steps > work.steps(most + 1)
     work.spend(work.steps())
-    assert work.most_faces(60) < 1000 and not work.hurried
+    assert work.most_faces(60) < 1000
 
 
 @pytest.mark.parametrize(("affordable", "most"), [(0, 52_000), (60_000, 60_000), (10**6, 92_000)])
@@ -143,10 +143,13 @@ def test_steps_end_with_the_time_there_is() -> None:
     while time.process_time() < end:
         pass
     work.spend(5)
-    assert work.steps() < 0.2 * most and work.hurried  # five took a tenth of a second
+    # Five took a tenth of a second: time allows fewer than units do, but has not run out.
+    assert work.steps() < 0.2 * most and not work.out_of_time()
     while time.process_time() < end + 0.3:
         pass
-    assert work.steps(least=10) == 0
+    assert work.steps(least=10) == 0 and work.out_of_time()
+    work.spend(2 * most)
+    assert not work.out_of_time()  # units have, as well
 
 
 def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> None:
