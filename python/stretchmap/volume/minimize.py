@@ -9,7 +9,7 @@ where other volumes are asked for.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,12 @@ _SERVED = 0.5  # a shorter step shows that a Hessian is too old
 # single elements fill the gradient, the solver sees nothing else.
 _CUT, _DOUBT = 1e-2, 5
 IDLE = 20  # steps in a row that gain next to nothing prove it all the same
+# So many steps in a row, none of them short, that gain on average no more than so many times the
+# share at which one shows that there is little left, show it, too: what one gains is much or little
+# by turns. Where single elements cut steps short, the energy falls as slowly for a hundred of them.
+_STEPS, _SLOWLY = 8, 2.0
+# Times the residual asked for at the last weight, before it: the next weight moves all again.
+_ROUGHLY = 2.0
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
@@ -120,6 +126,7 @@ class _Standstill:
 
     doubt: int = 0
     idle: int = 0
+    energies: list[float] = field(default_factory=list)  # before the last steps, none short
 
     def shown(self, step: _core.volume.NewtonReport, enough: float) -> bool:
         """Of a step of which a gain of ``enough`` would be worth while."""
@@ -132,6 +139,15 @@ class _Standstill:
         self.idle = self.idle + 1 if small else 0
         proved = not (step.negative_curvature or self.doubt)
         return small and (proved or self.idle >= IDLE)
+
+    def slow(self, alpha: float, before: float, after: float, share: float, most: float) -> bool:
+        """Whether the last steps lowered the energy, or ``most``, by so small a share.
+
+        To be told of all steps with the same weights.
+        """
+        self.energies = [*self.energies[1 - _STEPS :], before] if alpha >= _SERVED else []
+        enough = _STEPS * _SLOWLY * share * min(after, most)
+        return len(self.energies) == _STEPS and self.energies[0] - after <= enough
 
 
 def grown(weight: float, alpha: float, growth: float, goal: float) -> float:
@@ -195,7 +211,7 @@ def minimize(
             return Minimized(x, False, "the time limit was reached", newton)
         weights = _core.volume.EnergyWeights(1.0, weight, 0.0, face)
         linear = _core.volume.NewtonOptions(
-            tol=o.cg_tol,
+            tol=o.cg_tol if weight >= goal else _ROUGHLY * o.cg_tol,
             max_cg=o.max_cg,
             keep_hessian=sharing.kept > 0,
             negative=_NEGATIVE if weight >= o.volume_weight else 0.0,
@@ -218,6 +234,10 @@ def minimize(
             newton.set_targets(goals)
             continue
         small = standstill.shown(step, weight * tolerance * min(before, fair))
+        if glide and volumes_alone and weight >= o.volume_weight:
+            small = standstill.slow(step.alpha, before, after, tolerance, fair) or small
+        if not glide and goal < o.volume_weight and step.alpha >= 1.0:
+            return Minimized(x, True, "whole steps lead on", newton)  # a start for the next stage
         if weight < goal:
             if step.alpha >= _SERVED:
                 weight = grown(weight, step.alpha, o.growth, goal)
