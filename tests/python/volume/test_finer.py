@@ -45,19 +45,20 @@ def mean_error(result: sm.VolumeMap) -> float:
 
 
 def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
-    """Of one plate the mean may gain a fifth or nearly nothing, of six together a twelfth."""
+    """Of one plate the mean may gain a fifth or nearly nothing, of six together a tenth."""
     solids = [plate(n, 3, 3) for n in range(7, 13)]
-    finer = [sm.volume_map(solid) for solid in solids]
+    exact = sm.VolumeOptions(cg_tol=0.05)  # rough solves lead to other minima by chance
+    finer = [sm.volume_map(solid, options=exact) for solid in solids]
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
-    coarse = [sm.volume_map(solid) for solid in solids]
+    coarse = [sm.volume_map(solid, options=exact) for solid in solids]
     for solid, before, after in zip(solids, coarse, finer, strict=True):
         assert not before.refinement.halved and after.refinement.halved
         assert before.converged and after.converged and after.certificate.certified
         assert unevenness(after, solid) < unevenness(before, solid)
-        assert mean_error(before) > engine._UNEVEN and mean_error(after) < 1.02 * mean_error(before)
+        assert mean_error(before) > engine._UNEVEN and mean_error(after) < mean_error(before)
         np.testing.assert_array_equal(after.mesh.V[: solid.n_vertices], solid.V)
         np.testing.assert_array_equal(after.mesh.boundary_vertices, solid.boundary_vertices)
-    assert sum(map(mean_error, finer)) < 0.95 * sum(map(mean_error, coarse))
+    assert sum(map(mean_error, finer)) < 0.9 * sum(map(mean_error, coarse))
     assert sum(map(unevenness, finer, solids)) < 0.85 * sum(map(unevenness, coarse, solids))
     n_finer, n_coarse = (sum(each.mesh.n_tets for each in maps) for maps in (finer, coarse))
     assert n_finer < 1.25 * n_coarse

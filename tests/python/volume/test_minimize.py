@@ -134,7 +134,8 @@ def plates() -> list[sm.TetMesh]:
 
 def test_growing_step_by_step_takes_fewer_steps_to_better_volumes(monkeypatch):
     def steps_and_error() -> tuple[int, float]:
-        maps = [sm.volume_map(plate) for plate in plates()]
+        exact = sm.VolumeOptions(cg_tol=0.05)  # rough solves lead to other minima by chance
+        maps = [sm.volume_map(plate, options=exact) for plate in plates()]
         stages = [record.stage for each in maps for record in each.history]
         return stages.count("glide"), sum(each.distortion.element_std for each in maps)
 
@@ -142,7 +143,7 @@ def test_growing_step_by_step_takes_fewer_steps_to_better_volumes(monkeypatch):
     steps, error = steps_and_error()
     monkeypatch.setattr(minimizing, "_EVEN", np.inf)
     steps_at_once, error_at_once = steps_and_error()
-    assert steps < 0.95 * steps_at_once and error < 0.85 * error_at_once
+    assert steps < 0.85 * steps_at_once and error < 0.85 * error_at_once
 
 
 @pytest.mark.parametrize("n_tets", [40_000, 80_000])
