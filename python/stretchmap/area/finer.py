@@ -46,6 +46,7 @@ _GROWTH, _SPARE = 2.5, 12_000
 _MOST_GROWTH, STEPS_LEFT = 5.0, (60, 50, 40, 30)
 _BENT = 0.5  # least share of its area that a face may keep when the flat chart is bent
 _PASSES = 14
+_TWINS = 2  # rounds in which the other long edges of needles follow: more cost more than they give
 _MORE = 3  # times as many faces that look inward as before: halving edges does not help
 _APPROACH = 10, 10, 10  # most steps towards areas, edges that sag too much halved after each
 # Face SD after the first of them from which on others lead no nearer, and nothing does.
@@ -95,6 +96,10 @@ class Finer:
     added : SurfaceRefinement
     affordable : int
         Faces with which work is left for what follows.
+    needles : bool
+        Whether the surface has more than a few.
+    near : bool
+        Whether its areas are being led to what they are to be.
     """
 
     level: Level
@@ -102,11 +107,14 @@ class Finer:
     ratio: float
     added: SurfaceRefinement
     affordable: int = 0
+    needles: bool = False
+    near: bool = False
 
     @classmethod
     def of(cls, level: Level, angles: NDArray[np.float64], ratio: float) -> Finer:
         """A surface as it is."""
-        return cls(level, angles, ratio, SurfaceRefinement.of(level.surface))
+        given = SurfaceRefinement.of(level.surface)
+        return cls(level, angles, ratio, given, needles=has_slivers(level.surface))
 
     @classmethod
     def wrapped(cls, level: Level, turns: NDArray[np.float64], phase: float, ratio: float) -> Finer:
@@ -179,7 +187,35 @@ class Finer:
         shifts = np.rint((corners - angles[done.surface.F]) / TWO_PI).astype(np.int32)
         forms = forms_of(done.surface, shifts[..., 0], shifts[..., 1])
         finer = Level.of(done.surface, angles / TWO_PI, forms, level.aspect)
-        return Finer(finer, angles, self.ratio, self.added.after(done), self.affordable)
+        return replace(self, level=finer, angles=angles, added=self.added.after(done))
+
+    def halved_with_twins(self, marked: NDArray[np.bool_]) -> Finer:
+        """With those edges halved, and the other long edges of their needles where they then sag.
+
+        The midpoint of one long edge lies on the torus, that of the other, which sagged as much, as
+        deep below it as before: a face as high as the edges sag is what is left between them.
+        """
+        finer = self.halved(marked)
+        if not (self.needles and self.near):
+            return finer
+        ends, before = self._keys(len(self.angles)), self.sags()
+        for _ in range(_TWINS):
+            keys, sags = finer._keys(len(self.angles)), finer.sags()
+            order = np.argsort(keys)
+            whole = np.flatnonzero(~marked)
+            now = sags[order[np.searchsorted(keys, ends[whole], sorter=order)]]
+            deeper = whole[now > np.maximum(before[whole], _FAR)]
+            if not len(deeper):
+                break
+            marked = marked.copy()
+            marked[deeper] = True
+            finer = self.halved(marked)
+        return finer
+
+    def _keys(self, n: int) -> NDArray[np.int64]:
+        """(e,) a number for each edge between two of the first ``n`` vertices, n² for others."""
+        i, j = np.sort(self.level.surface.edges, axis=1).T.astype(np.int64)
+        return np.where(j < n, i * n + j, n * n)
 
     def fitted(self, sag: float, share: float = 1.0) -> Finer | None:
         """With edges halved until none sags too much; None if that takes too many faces.
@@ -199,7 +235,7 @@ class Finer:
             pieces = np.ceil(np.sqrt(sags[marked] / sag))
             if finer.too_many(int(pieces.sum()) - len(pieces), share):
                 return None
-            finer = finer.halved(marked)
+            finer = finer.halved_with_twins(marked)
         return finer.outward()
 
     def outward(self) -> Finer:
@@ -218,7 +254,7 @@ class Finer:
             marked = finer.largest_in(inward, finer.sags())
             if not marked.any() or finer.too_many(int(marked.sum())):
                 break
-            finer = finer.halved(marked)
+            finer = finer.halved_with_twins(marked)
         return finer
 
     def largest_in(
@@ -238,7 +274,7 @@ class Finer:
         self, progress: Progress | None, work: Work
     ) -> tuple[Finer, Pace, list[IterationRecord]]:
         """With areas nearly right, edges that sag too much meanwhile halved, too; pace, records."""
-        finer, pace, history = self, Pace(), []
+        finer, pace, history = replace(self, near=True), Pace(), []
         for most, after in zip(_APPROACH, STEPS_LEFT[1:], strict=True):
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
             work.begin(newton, n_faces)
@@ -275,7 +311,7 @@ class Finer:
         off = np.flatnonzero(np.abs(self.ratios() - 1.0) > _OFF * tol)
         marked = self.largest_in(off, self.sags(), _LITTLE)
         return (
-            self.halved(marked).outward()
+            self.halved_with_twins(marked).outward()
             if marked.any() and not self.too_many(int(marked.sum()))
             else None
         )

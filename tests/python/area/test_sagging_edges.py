@@ -137,6 +137,23 @@ def test_long_edges_of_needles_may_lie_deep_below_the_torus() -> None:
     # One of them halved alone stands up where the other still lies deep.
     once = needles.halved(np.arange(len(long)) == np.flatnonzero(long)[0])
     assert once.sags().max() > 5.0
+    # In one ring of them every third; the ones between go with them, those of other rings do not.
+    third = long & (i // 400 == 3) & (j // 400 == 4) & (i % 3 == 0)
+    assert needles.halved(third).sags().max() > 5.0
+    twins = dataclasses.replace(needles, near=True).halved_with_twins(third)
+    assert twins.sags().max() < 1.0
+    assert 2 * third.sum() < twins.added.n_split < 7 * third.sum()
+
+
+def test_only_needles_have_twins() -> None:
+    surface = small_handle(0, 3.8)
+    start = dataclasses.replace(start_of(surface), near=True)
+    marked = start.sags() > 1.0
+    assert not start.needles and marked.any()
+    alike = start.halved(marked), start.halved_with_twins(marked)
+    assert alike[0].added.n_split == alike[1].added.n_split
+    more = dataclasses.replace(start, needles=True).halved_with_twins(marked)
+    assert more.added.n_split > alike[0].added.n_split
 
 
 @pytest.mark.parametrize("seed", [0, 4])
