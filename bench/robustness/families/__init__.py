@@ -66,6 +66,7 @@ def families() -> dict[str, Family]:
         knots,
         parts,
         pillars,
+        pipes,
         ribbons,
         rings,
         shells,
@@ -76,6 +77,6 @@ def families() -> dict[str, Family]:
 
     rooms = (
         tubes, drilled, knots, rings, handles, spiky, coarse, stretched, shells, pillars, ribbons,
-        parts,
+        parts, pipes,
     )  # fmt: skip
     return {family.name: family for room in rooms for family in room.FAMILIES}

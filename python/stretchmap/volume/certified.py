@@ -25,9 +25,10 @@ _log = logging.getLogger("stretchmap")
 
 _MINIMIZED = ("frozen", "glide")  # stages whose energies are comparable
 _WORTH_A_START = 0.1  # share of the time; with less left no further one is made
-# Tets stuck at most, and share of the time left, where a start that made room is gone on with
-# before another follows: nearly there, it may take much of the time yet.
-_NEARLY, _LATE = 30, 0.2
+# Tets stuck at most, or share of all, and share of the time left, where a start that made room is
+# gone on with before another follows: nearly there, it may take much of the time yet. So it is
+# where what is left would not do for another one.
+_NEARLY, _NEARLY_SHARE, _LATE = 30, 2e-3, 0.2
 _QUICKER = 0.3  # times as long as one that leaves tets stuck, one that serves takes at least
 # Mean abs(ratio - 1) from which on another torus is tried, so many times thinner, if so many times
 # the time the last start took is left: where areas of the boundary fit best, what few edges round a
@@ -48,7 +49,7 @@ def certified_map(
 
     Where folded faces had to be held for that, the others are tried in the time left. A start in
     which tets stay stuck makes room for the next one; if none serves, or no more time is left than
-    the last one took, or two thirds are spent and few are stuck, the best is gone on with. A map
+    the last one took, or little and few are stuck, the best is gone on with. A map
     that keeps volumes badly is made again on thinner and thinner tori, while that helps and time
     lasts.
 
@@ -82,8 +83,9 @@ def certified_map(
                 if thinner is None:
                     return
                 yield thinner
-            nearly = 0 < least[1] <= _NEARLY and budget.left < _LATE * budget.seconds
-            late = nearly or budget.left < _QUICKER * latest
+            few = 0 < least[1] <= max(_NEARLY, _NEARLY_SHARE * solid.n_tets)
+            late = few and budget.left < max(_LATE * budget.seconds, latest)
+            late = late or budget.left < _QUICKER * latest
             if left_off is not None and (another is None or late):
                 begin, left_off = left_off, None
                 yield begin

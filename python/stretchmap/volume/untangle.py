@@ -33,10 +33,11 @@ _WIDEST, _WIDEST_FROM_AFAR, _NARROW = 1.0, 20.0, 0.1
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
-# a few tets are left after some settled steps and whole ones follow with ease. Faces that glide are
-# not hurried: single ones stay folded then.
+# whole steps follow with ease, as long as epsilon is not narrow or when a few tets are left after
+# some settled ones. Faces that glide are not hurried: single ones stay folded then.
 _SLOW, _SWIFT, _DRAGS = 0.9, 0.7, 2
 _BETTER = 1.05
+_FEWER = 0.93  # inverted elements, of those there were: patches are quicker than a step for each
 _AWAY = 6  # steps where nothing was inverted to begin with
 _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to the floor
 # Inverted elements that are better worked on in patches: among slivers a hundredth of them hold up
@@ -80,7 +81,8 @@ class Patience:
     since: int = 0
 
     def note(self, left: int, worst: float, settled: bool) -> None:
-        if left < self.fewest or (left == 0 and worst > _BETTER * self.highest):
+        fewer = left < _FEWER * self.fewest
+        if fewer or (left == 0 and (left < self.fewest or worst > _BETTER * self.highest)):
             self.fewest, self.highest, self.since = left, worst, 0
         elif settled:
             self.since += 1
@@ -132,7 +134,8 @@ def _continue(
             best = Untangled(x, int(left), worst)
         if settled:
             drags = left <= _FEW and patience.since >= _DRAGS
-            swift = (drags or wide) and step.alpha >= 1.0 and not face
+            easy = drags or epsilon > _NARROW
+            swift = easy and step.alpha >= 1.0 and not face
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
 

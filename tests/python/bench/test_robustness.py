@@ -25,7 +25,7 @@ def test_there_are_the_families_asked_for(room):
 
 
 @pytest.mark.parametrize(
-    "name", ["raw_tubes", "thorny", "cut_grids", "stacks", "bottles", "ribbons", "parts"]
+    "name", ["raw_tubes", "thorny", "cut_grids", "stacks", "bottles", "ribbons", "parts", "pipes"]
 )
 def test_a_seed_is_a_solid_torus_and_always_the_same(name):
     from families import families
@@ -59,6 +59,16 @@ def test_ribbons_close_after_half_turns():
         corners = surface.V[surface.F]
         longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
         assert longest < 0.5
+
+
+def test_walls_of_pipes_are_thinner_than_their_triangles():
+    from families.pipes import pipe
+    from surfaces import fill
+
+    solids = [fill(pipe(np.random.default_rng(seed), 6_000)) for seed in range(6)]
+    assert all(3_000 < solid.n_tets < 20_000 for solid in solids)
+    inside = [solid.n_vertices - solid.surface.n_vertices for solid in solids]
+    assert np.median(inside) == 0
 
 
 def test_more_parts_than_one_hole_are_refused():

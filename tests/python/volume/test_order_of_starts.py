@@ -32,7 +32,9 @@ class Found:
         return SimpleNamespace(certified=self.flips == 0, reason="", checks={})
 
 
-def order(monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int = 0) -> list[str]:
+def order(
+    monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int = 0, n_tets: int = 1000
+) -> list[str]:
     """Names of the starts as they are solved, in capitals where none is to make room.
 
     ``stuck`` says how many tets each leaves inverted in haste, ``kept`` how many if gone on with,
@@ -56,7 +58,7 @@ def order(monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int 
     monkeypatch.setattr(certified, "ranked_starts", starts)
     monkeypatch.setattr(certified, "solve", solve)
     monkeypatch.setattr(certified, "volume_result", lambda o, *_: Found(int(o.stop_reason)))
-    solid = SimpleNamespace(n_tets=1000)
+    solid = SimpleNamespace(n_tets=n_tets)
     found = certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
     assert (found.distortion.flips == 0) == (solved[-1].isupper() and kept == 0)
     return solved
@@ -75,12 +77,21 @@ def order(monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int 
         ({"a": 400, "b": 900, "c": 31}, [0.9, 0.2, 0.15], 0, "abA"),
         # Gone on with in vain, once only: then the others.
         ({"a": 4, "b": 9, "c": 6}, [0.19, 0.18, 0.17, 0.15], 4, "aAbc"),
+        # Nearly there, with less time left than another would take as long for.
+        ({"a": 4, "b": 9}, [0.45, 0.1], 0, "aA"),
+        ({"a": 31, "b": 39}, [0.45, 0.09], 0, "ab"),
         # No time for any other.
         ({"a": 4, "b": 9}, [0.05], 0, "a"),
     ],
 )
 def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, expected) -> None:
     assert "".join(order(monkeypatch, stuck, left, kept)) == expected
+
+
+@pytest.mark.parametrize(("n_tets", "expected"), [(29_000, "ab"), (31_000, "aA")])
+def test_of_many_tets_more_are_few(monkeypatch, n_tets, expected) -> None:
+    found = order(monkeypatch, {"a": 60, "b": 90}, [0.45, 0.05], 0, n_tets)
+    assert "".join(found) == expected
 
 
 @pytest.mark.parametrize(("left", "expected"), [(1.0, 0.5), (0.55, 1.0)])

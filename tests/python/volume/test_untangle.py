@@ -40,7 +40,7 @@ def paces(left: int, alpha: float = 1.0, face: float = 0.0) -> np.ndarray:
     """Of the regularized worst determinant, by which it is to fall in each of ten steps."""
     newton = Dragging(left, alpha)
     _continue(
-        newton, np.zeros((1, 3)), face=face, floor=0.02, steps=10,
+        newton, np.zeros((1, 3)), face=face, floor=0.005, steps=10,
         enough=lambda _left, _since: False, linear=None, budget=Budget(60.0),
     )  # fmt: skip
     chi = 0.5 * (-0.01 + np.sqrt(np.square(newton.epsilons) + 1e-4))
@@ -75,12 +75,32 @@ def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
     # More than before are inverted meanwhile: nothing is given up until epsilon is narrow.
     assert (far > 0.1).sum() + 40 == len(far)
     # Full steps are hurried down to that, but not where faces glide, nor short ones.
-    pace = far[1:] / far[:-1]
-    assert pace[:5] == pytest.approx(np.sqrt(0.7), abs=0.01)
-    assert pace[-5:] == pytest.approx(np.sqrt(0.9), abs=0.01)
-    for given in ({"alpha": 0.5}, {"face": 1.0}):
-        slow = followed(-400.0, from_afar=True, **given)
-        assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
+    for epsilons in (far, near):
+        pace = epsilons[1:] / epsilons[:-1]
+        assert pace[:5] == pytest.approx(np.sqrt(0.7), abs=0.01)
+        assert pace[-5:] == pytest.approx(np.sqrt(0.9), abs=0.01)
+    for afar in (True, False):
+        for given in ({"alpha": 0.5}, {"face": 1.0}):
+            slow = followed(-400.0, from_afar=afar, **given)
+            assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
+
+
+@pytest.mark.parametrize(("cured", "steps"), [(3, 6), (6, 11)])
+def test_single_elements_less_are_no_progress(cured, steps):
+    """Of a hundred a few at a time: patches are quicker, unless as many follow in a few steps."""
+
+    class Slow(Dragging):
+        def step(self, x, weights, linear):
+            if len(self.epsilons) % 3 == 2:
+                self.left -= cured
+            return super().step(x, weights, linear)
+
+    newton = Slow(100, worst=-0.01)
+    _continue(
+        newton, np.zeros((1, 3)), face=0.0, floor=0.005, steps=11,
+        enough=lambda _left, since: since >= 6, linear=None, budget=Budget(60.0),
+    )  # fmt: skip
+    assert len(newton.epsilons) == steps
 
 
 @pytest.mark.parametrize("better", [True, False])
@@ -254,8 +274,10 @@ def test_a_start_gone_on_with_begins_with_patches(monkeypatch, resumed):
     assert done == [*([] if resumed else ["whole"]), "patches", "thorough", "patches"]
 
 
-@pytest.mark.parametrize(("share", "hopeless"), [(0.015, False), (0.025, True)])
-def test_with_more_than_a_fiftieth_inverted_another_start_is_better(monkeypatch, share, hopeless):
+@pytest.mark.parametrize(("share", "hopeless"), [(0.025, False), (0.035, True)])
+def test_with_more_than_three_hundredths_inverted_another_start_is_better(
+    monkeypatch, share, hopeless
+):
     run = run_of(sm.samples.bumpy_torus(600))
     monkeypatch.setattr(engine, "_inverted", lambda run: int(share * run.problem.solid.n_tets))
     assert run.hopeless == hopeless
@@ -272,6 +294,26 @@ def test_a_hundredth_of_the_tets_is_soon_left_to_patches(monkeypatch, left):
     share = left / 12_000 * run.problem.solid.n_tets
     assert asked[0](int(share), 4) == (left < 120)
     assert not asked[0](int(share), 3)
+
+
+@pytest.mark.parametrize(("left", "rounds"), [(90, 2), (110, 1)])
+def test_what_patches_nearly_cured_when_time_was_up_is_gone_on_with(monkeypatch, left, rounds):
+    run = run_of(sm.samples.bumpy_torus(6000))
+    run.hasty, run.history.budget, seconds = True, Budget(0.0), []
+    monkeypatch.setattr(engine, "untangle_whole", lambda _, x, *a, **k: Untangled(x, 1000, -1.0))
+    inverted = iter([1000])
+    monkeypatch.setattr(engine, "_inverted", lambda run: next(inverted, left))
+
+    def patched(run, *, glide, few=0, rings=()):
+        if not glide:
+            seconds.append(run.history.budget.left)
+        return np.arange(left)
+
+    monkeypatch.setattr(engine, "_patched", patched)
+    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck: stuck)
+    assert len(engine._untangle_inside(run, glide=True)) == left
+    assert len(seconds) == rounds and seconds[0] == 0.0
+    assert rounds == 1 or seconds[1] == pytest.approx(0.4 * run.budget.left, rel=0.1)
 
 
 def test_single_elements_are_relaxed_on_a_torus():
