@@ -33,11 +33,14 @@ _WIDEST, _WIDEST_FROM_AFAR, _NARROW = 1.0, 20.0, 0.1
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
-# whole steps follow with ease, as long as epsilon is not narrow or when a few tets are left after
-# some settled ones. Faces that glide are not hurried: single ones stay folded then.
+# whole steps follow with ease and a few tets are left after some settled ones; in haste or from
+# afar as long as epsilon is not narrow. Faces that glide are not hurried: single ones stay folded
+# then.
 _SLOW, _SWIFT, _DRAGS = 0.9, 0.7, 2
 _BETTER = 1.05
-_FEWER = 0.93  # inverted elements, of those there were: patches are quicker than a step for each
+# Inverted elements, of those there were, that are progress in haste: patches are quicker than a
+# step for each. Where no other start follows, that leaves more than patches cure.
+_FEWER = 0.93
 _AWAY = 6  # steps where nothing was inverted to begin with
 _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to the floor
 # Inverted elements that are better worked on in patches: among slivers a hundredth of them hold up
@@ -72,16 +75,16 @@ class Untangled:
 class Patience:
     """Counts the steps since the last one that got further.
 
-    Fewer inverted elements are progress, then a better worst one; and energy that still falls is no
-    standstill.
+    Fewer inverted elements are progress (less than a share of what they were), then a better worst
+    one; and energy that still falls is no standstill.
     """
 
     fewest: float = math.inf
     highest: float = -math.inf
     since: int = 0
 
-    def note(self, left: int, worst: float, settled: bool) -> None:
-        fewer = left < _FEWER * self.fewest
+    def note(self, left: int, worst: float, settled: bool, share: float = 1.0) -> None:
+        fewer = left < share * self.fewest
         if fewer or (left == 0 and (left < self.fewest or worst > _BETTER * self.highest)):
             self.fewest, self.highest, self.since = left, worst, 0
         elif settled:
@@ -128,13 +131,13 @@ def _continue(
         settled = before - after.energy <= _SETTLED * (before + 2.0)
         wide = from_afar and epsilon > _NARROW
         patience = Patience() if wide else patience
-        patience.note(left, worst, settled)
+        patience.note(left, worst, settled, _FEWER if hasty else 1.0)
         short = short + 1 if step.alpha <= _SHORT and left >= best.left else 0
         if (left, -worst) <= (best.left, -best.worst):
             best = Untangled(x, int(left), worst)
         if settled:
             drags = left <= _FEW and patience.since >= _DRAGS
-            easy = drags or epsilon > _NARROW
+            easy = drags or wide or (hasty and epsilon > _NARROW)
             swift = easy and step.alpha >= 1.0 and not face
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
@@ -170,7 +173,8 @@ def untangle_whole(
     thorough : bool
         Leave none to the patches.
     hasty : bool
-        Leave them all to the patches where steps stay short.
+        Leave them all to the patches where steps stay short or cure single ones, and take larger
+        ones on the way there.
     from_afar : bool
         Whether epsilon may be wide to begin with, so that many more turn over and back.
     """

@@ -70,7 +70,7 @@ def followed(worst: float, *, alpha: float = 1.0, face: float = 0.0, **given) ->
 
 
 def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
-    far, near = followed(-400.0, from_afar=True), followed(-400.0)
+    far, near = followed(-400.0, from_afar=True), followed(-400.0, hasty=True)
     assert far[0] == 20.0 and near[0] == 1.0 and len(near) == 40
     # More than before are inverted meanwhile: nothing is given up until epsilon is narrow.
     assert (far > 0.1).sum() + 40 == len(far)
@@ -79,14 +79,15 @@ def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
         pace = epsilons[1:] / epsilons[:-1]
         assert pace[:5] == pytest.approx(np.sqrt(0.7), abs=0.01)
         assert pace[-5:] == pytest.approx(np.sqrt(0.9), abs=0.01)
-    for afar in (True, False):
-        for given in ({"alpha": 0.5}, {"face": 1.0}):
-            slow = followed(-400.0, from_afar=afar, **given)
-            assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
+    slows = [{"from_afar": True, "alpha": 0.5}, {"hasty": True, "alpha": 0.5}, {}]
+    slows += [{"from_afar": True, "face": 1.0}, {"hasty": True, "face": 1.0}]
+    for given in slows:
+        slow = followed(-400.0, **given)
+        assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
 
 
-@pytest.mark.parametrize(("cured", "steps"), [(3, 6), (6, 11)])
-def test_single_elements_less_are_no_progress(cured, steps):
+@pytest.mark.parametrize(("cured", "hasty", "steps"), [(3, True, 6), (3, False, 11), (6, True, 11)])
+def test_in_haste_single_elements_less_are_no_progress(cured, hasty, steps):
     """Of a hundred a few at a time: patches are quicker, unless as many follow in a few steps."""
 
     class Slow(Dragging):
@@ -97,7 +98,7 @@ def test_single_elements_less_are_no_progress(cured, steps):
 
     newton = Slow(100, worst=-0.01)
     _continue(
-        newton, np.zeros((1, 3)), face=0.0, floor=0.005, steps=11,
+        newton, np.zeros((1, 3)), face=0.0, floor=0.005, steps=11, hasty=hasty,
         enough=lambda _left, since: since >= 6, linear=None, budget=Budget(60.0),
     )  # fmt: skip
     assert len(newton.epsilons) == steps
