@@ -39,18 +39,17 @@ _log = logging.getLogger("stretchmap")
 _ROUNDS, _HASTY_ROUNDS = 12, 3  # of halving edges; fewer where another start follows
 # Reach of the patches, to begin with and where that does not help; and with more vertices there.
 _RINGS, _NARROW = (2, 4, 8), (2, 4)
-# Inverted tets: with a larger share of all, it is not a matter of single places.
+# Inverted tets: with a larger share of all, patches do not help, and another start may.
 _MOST_STUCK = 0.05
 _HELPED = 0.95  # of them are left at most where patches are worth another round
-_HOPELESS = 0.03  # share of the tets for which another start is worth more than patches
 _FEW_STUCK = 30  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
 # Shares of the time left before the edges round stuck tets are halved instead, and for wide patches
 # where another start follows; that much of all has to be left for those.
 _GLIDING, _WIDELY, _EARLY = 0.4, 0.15, 0.5
-# Of the tets inverted to begin with, so few are left that such a share of the time is better spent
-# on them than on another start.
-_CLOSE, _GOING_ON = 0.1, 0.4
+# Where patches had cured half of their tets when time was up, such a share of what is left is
+# better spent on the others than on another start.
+_CURED, _GOING_ON = 0.5, 0.4
 _WORTH = 0.8  # share for patches in which all edges are halved: mostly those do
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
@@ -90,7 +89,7 @@ class _Run:
     @property
     def hopeless(self) -> bool:
         """Whether more tets are inverted than patches are going to untangle in time."""
-        return _inverted(self) > _HOPELESS * len(self.history.model.T)
+        return _inverted(self) > _MOST_STUCK * len(self.history.model.T)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -252,7 +251,7 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     A boundary that is going to glide on a mesh gives way before that. On a torus all of it would
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
-    history, begin, many = run.history, run.x, _inverted(run)
+    history, begin = run.history, run.x
     if not run.resumed:  # else it has been at its end
         run.x = untangle_whole(history.model, begin, history, glide=False, hasty=run.hasty).x
     if run.hasty and run.hopeless:
@@ -262,8 +261,9 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
             run.x = near
     if run.hasty and run.hopeless:
         return stuck_tets(history.model, run.x, glide=False)
+    many = _inverted(run)
     stuck = _patched(run, glide=False, few=_FEW_STUCK if glide else 0)
-    if run.hasty and history.budget.spent and _FEW_STUCK < len(stuck) <= _CLOSE * many:
+    if run.hasty and history.budget.spent and _FEW_STUCK < len(stuck) <= _CURED * many:
         history.budget = run.budget.share(_GOING_ON)
         stuck = _patched(run, glide=False, few=_FEW_STUCK if glide else 0)
     if glide and 0 < len(stuck) <= _FEW_STUCK:

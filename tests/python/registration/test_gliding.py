@@ -21,11 +21,14 @@ def pair():
     return samples.vertebra_pair(n_landmarks=12, n_tets=(2500, 3500))
 
 
+EXACT = FillOptions(cg_tol=3e-3)  # with rough solves, at which step it ends is a matter of rounding
+
+
 @pytest.fixture(scope="module")
 def maps(pair):
     marks = pair.source_landmarks, pair.target_landmarks
     return {
-        way: sm.register(pair.source, pair.target, marks, boundary=way)
+        way: sm.register(pair.source, pair.target, marks, boundary=way, options=EXACT)
         for way in ("frozen", "glide")
     }
 
@@ -194,7 +197,7 @@ def test_the_distance_from_the_target_is_that_of_its_parts(pair, maps):
 
 def test_there_and_back_is_measured(pair, maps):
     marks = pair.target_landmarks, pair.source_landmarks
-    back = sm.register(pair.target, pair.source, marks)
+    back = sm.register(pair.target, pair.source, marks, options=EXACT)
     gaps = sm.inverse_consistency(maps["glide"], back)
     assert gaps.shape == (maps["glide"].mesh.n_vertices,)
     assert np.isnan(gaps).mean() < 0.01 and np.nanmedian(gaps) < 0.008
