@@ -48,10 +48,10 @@ def certified_map(
     """The map from the first start that leads to a certified one, or the best there is.
 
     Where folded faces had to be held for that, the others are tried in the time left. A start in
-    which tets stay stuck makes room for the next one; if none serves, or no more time is left than
-    the last one took, or little and few are stuck, the best is gone on with. A map
-    that keeps volumes badly is made again on thinner and thinner tori, while that helps and time
-    lasts.
+    which tets stay stuck makes room for the next one. The best is gone on with if none serves, or
+    if no time is left for another: less than one that serves takes at least or, where few tets are
+    stuck, than the last one took. A map that keeps volumes badly is made again on thinner and
+    thinner tori, while that helps and time lasts.
 
     Parameters
     ----------
@@ -84,9 +84,8 @@ def certified_map(
                     return
                 yield thinner
             few = 0 < least[1] <= max(_NEARLY, _NEARLY_SHARE * solid.n_tets)
-            late = few and budget.left < max(_LATE * budget.seconds, latest)
-            late = late or budget.left < _QUICKER * latest
-            if left_off is not None and (another is None or late):
+            late = max(_LATE * budget.seconds, latest) if few else _QUICKER * latest
+            if left_off is not None and (another is None or budget.left < late):
                 begin, left_off = left_off, None
                 yield begin
 

@@ -137,7 +137,7 @@ def _continue(
             best = Untangled(x, int(left), worst)
         if settled:
             drags = left <= _FEW and patience.since >= _DRAGS
-            easy = drags or wide or (hasty and epsilon > _NARROW)
+            easy = drags or ((hasty or from_afar) and epsilon > _NARROW)
             swift = easy and step.alpha >= 1.0 and not face
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
