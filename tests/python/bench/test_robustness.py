@@ -61,7 +61,7 @@ def test_ribbons_close_after_half_turns():
         assert longest < 0.5
 
 
-def test_walls_of_pipes_are_thinner_than_their_triangles():
+def test_walls_of_pipes_have_hardly_a_vertex_inside():
     from families.pipes import pipe
     from surfaces import fill
 

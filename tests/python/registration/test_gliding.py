@@ -21,7 +21,9 @@ def pair():
     return samples.vertebra_pair(n_landmarks=12, n_tets=(2500, 3500))
 
 
-EXACT = FillOptions(cg_tol=3e-3)  # with rough solves, at which step it ends is a matter of rounding
+# Of this pair, unlike those of `test_other_pairs_come_near_the_truth`, rounding decides at which
+# step gliding ends: with solves as rough as by default errors are 0.014 to 0.018.
+EXACT = FillOptions(cg_tol=3e-3)
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +63,23 @@ def test_gliding_against_the_truth(pair, maps):
     assert error["glide"].mean() < 0.017 and error["glide"][skin].mean() < 0.016
     assert error["glide"].max() < 0.08
     assert error["frozen"].mean() < 0.0095 and error["frozen"][skin].mean() < 0.009
+
+
+def test_other_pairs_come_near_the_truth():
+    errors, gaps = [], []
+    for seed in (1, 2, 4, 5, 6):
+        pair = samples.vertebra_pair(n_landmarks=12, seed=seed, n_tets=(2500, 3500))
+        marks, size = (pair.source_landmarks, pair.target_landmarks), np.ptp(pair.target.V, axis=0)
+        there = sm.register(pair.source, pair.target, marks)
+        back = sm.register(pair.target, pair.source, marks[::-1])
+        assert there.stop_reason == back.stop_reason == "volumes are kept"
+        apart = np.linalg.norm(there.image[: pair.source.n_vertices] - pair.truth, axis=1)
+        errors.append(apart / np.linalg.norm(size))
+        gaps.append(np.nanmedian(sm.inverse_consistency(there, back)))
+    assert np.mean([error.mean() for error in errors]) < 0.0085
+    assert max(error.mean() for error in errors) < 0.0105
+    assert max(error.max() for error in errors) < 0.06
+    assert np.mean(gaps) < 0.005 and max(gaps) < 0.007
 
 
 def test_gliding_goes_no_farther_than_is_asked():
