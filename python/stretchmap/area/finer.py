@@ -200,11 +200,11 @@ class Finer:
             return finer
         ends, before = self._keys(len(self.angles)), self.sags()
         for _ in range(_TWINS):
-            keys, sags = finer._keys(len(self.angles)), finer.sags()
-            order = np.argsort(keys)
-            whole = np.flatnonzero(~marked)
-            now = sags[order[np.searchsorted(keys, ends[whole], sorter=order)]]
-            deeper = whole[now > np.maximum(before[whole], _FAR)]
+            # Those still whole, here and there: more are halved than were marked.
+            _, here, there = np.intersect1d(
+                ends, finer._keys(len(self.angles)), return_indices=True
+            )
+            deeper = here[finer.sags()[there] > np.maximum(before[here], _FAR)]
             if not len(deeper):
                 break
             marked = marked.copy()

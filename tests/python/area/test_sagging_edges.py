@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
@@ -143,6 +144,24 @@ def test_long_edges_of_needles_may_lie_deep_below_the_torus() -> None:
     twins = dataclasses.replace(needles, near=True).halved_with_twins(third)
     assert twins.sags().max() < 1.0
     assert 2 * third.sum() < twins.added.n_split < 7 * third.sum()
+
+
+def test_twins_are_edges_that_are_still_whole(monkeypatch) -> None:
+    """Others are halved with those marked, as the longest of a face, and are no twins."""
+    start = dataclasses.replace(start_of(small_handle(0, 3.8)), near=True, needles=True)
+    halved, rounds = Finer.halved, []
+
+    def seen(finer, marked):
+        rounds.append((marked, halved(finer, marked)))
+        return rounds[-1][1]
+
+    monkeypatch.setattr(Finer, "halved", seen)
+    start.halved_with_twins(start.sags() > 0.5)
+    assert len(rounds) == 3
+    for (marked, finer), (more, _) in itertools.pairwise(rounds):
+        whole = set(map(tuple, np.sort(finer.level.surface.edges, axis=1)))
+        twins = start.level.surface.edges[more & ~marked]
+        assert len(twins) and whole.issuperset(map(tuple, np.sort(twins, axis=1)))
 
 
 def test_only_needles_have_twins() -> None:
