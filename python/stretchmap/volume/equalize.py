@@ -13,7 +13,7 @@ from .options import VolumeOptions
 __all__ = ["equalize"]
 
 _WORTHWHILE = 0.1  # share of the error a shift has to take away for another to follow
-_GENTLE = 0.2  # most of its volume that equalizing takes from a tet
+_GENTLE = 0.2  # most of its volume that shifting takes from a tet
 
 
 def equalize(
@@ -28,9 +28,9 @@ def equalize(
     """Make the volumes between level surfaces of u, v and s those of the source.
 
     Newton steps at the largest lambda towards the targets of `Marginals`, then its shifts, as long
-    as they help. Both leave vertices in place where the volume of a tet would change by more than a
-    fifth: near slivers, which nothing smooth can move. Should that fold a boundary face, the stage
-    ends with the image before. The recorded energy is `Marginals.error`.
+    as they help. Shifts leave vertices in place where the volume of a tet would change by more than
+    a fifth: near slivers, which nothing smooth can move. Should that fold a boundary face, the
+    stage ends with the image before. The recorded energy is `Marginals.error`.
 
     Parameters
     ----------
@@ -57,7 +57,6 @@ def equalize(
     weights = _core.volume.EnergyWeights(1.0, o.volume_weight, 0.0, o.face_weight if glide else 0.0)
     linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=True)
     total = o.target_iter + o.shift_iter
-    volumes = _core.mesh.tet_volumes(x, model.T)
     measured = marginals.measure(x)
     for iteration in range(total):
         if history.budget.spent:
@@ -69,9 +68,10 @@ def equalize(
             moved, step = newton.step(x, weights, linear)
             alpha, change = step.alpha, step.decrement
         else:
-            moved = marginals.shifted(x)
+            if iteration == o.target_iter:
+                volumes = _core.mesh.tet_volumes(x, model.T)
+            moved = gently_moved(model.T, x, marginals.shifted(x), volumes)
             alpha, change = 1.0, float(np.linalg.norm(moved - x, axis=1).max())
-        moved = gently_moved(model.T, x, moved, volumes)
         state = newton.value(moved, weights)
         if state.flips or state.folds:
             break
