@@ -159,3 +159,25 @@ def test_without_time_left_nothing_is_equalized(seconds, taken):
     found = equalize(model, moved, history, VolumeOptions(), glide=False, newton=None)
     assert (len(history.records) > 0) == taken
     assert np.array_equal(found, moved) != taken
+
+
+def test_equalizing_does_not_hold_back_what_still_moves():
+    """A dent the minimizer had not yet smoothed out goes, by steps of any size."""
+    small = samples.solid_torus(12_000, R=3.0, r=1.0)
+    problem = VolumeProblem.of(small, small.V[small.boundary_vertices], torus=TORUS)
+    model = problem.model(VolumeOptions())
+    middle = np.abs(small.V - [3.0, 0.0, 0.0]).sum(axis=1).argmin()
+    away = model.V - model.V[middle]
+    size = 0.6 * problem.torus.r
+    moved = model.V + 0.35 * np.exp(-((away / size) ** 2).sum(axis=1))[:, None] * away
+    moved[model.boundary] = model.V[model.boundary]
+
+    def off(x):
+        volumes = [_core.mesh.tet_volumes(at, small.T) for at in (x, model.V)]
+        return np.abs(volumes[0] / volumes[1] - 1.0)
+
+    assert (_core.mesh.tet_volumes(moved, small.T) > 0.0).all() and off(moved).max() > 0.4
+    history = History(model, Budget(60.0))
+    found = equalize(model, moved, history, VolumeOptions(), glide=False, newton=None)
+    assert off(found).max() < 0.1
+    assert off(found).mean() < 0.6 * off(moved).mean()
