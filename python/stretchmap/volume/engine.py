@@ -42,7 +42,7 @@ _RINGS, _NARROW = (2, 4, 8), (2, 4)
 # Inverted tets: with a larger share of all, patches do not help, and another start may.
 _MOST_STUCK = 0.05
 _HELPED = 0.95  # of them are left at most where patches are worth another round
-_FEW_STUCK = 30  # worth more vertices round them before anything else
+_FEW_STUCK = 60  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
 # Shares of the time left before the edges round stuck tets are halved instead, and for wide patches
 # where another start follows; that much of all has to be left for those.
