@@ -30,7 +30,7 @@ from .model import History
 from .options import FillOptions, VolumeOptions
 from .problem import Outcome, VolumeProblem
 from .start import started
-from .untangle import folded_faces, stuck_tets, untangle_patches, untangle_whole
+from .untangle import MOST_STUCK, folded_faces, stuck_tets, untangle_patches, untangle_whole
 
 __all__ = ["solve"]
 
@@ -39,8 +39,6 @@ _log = logging.getLogger("stretchmap")
 _ROUNDS, _HASTY_ROUNDS = 12, 3  # of halving edges; fewer where another start follows
 # Reach of the patches, to begin with and where that does not help; and with more vertices there.
 _RINGS, _NARROW = (2, 4, 8), (2, 4)
-# Inverted tets: with a larger share of all, patches do not help, and another start may.
-_MOST_STUCK = 0.05
 _HELPED = 0.95  # of them are left at most where patches are worth another round
 _FEW_STUCK = 60  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
@@ -89,7 +87,7 @@ class _Run:
     @property
     def hopeless(self) -> bool:
         """Whether more tets are inverted than patches are going to untangle in time."""
-        return _inverted(self) > _MOST_STUCK * len(self.history.model.T)
+        return _inverted(self) > MOST_STUCK * len(self.history.model.T)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -208,7 +206,7 @@ def _untangle(run: _Run, *, glide: bool) -> int:
     for _ in range(_ROUNDS):
         if not len(stuck) or run.problem.refinement is None or history.budget.spent:
             break
-        if len(stuck) > min(_MOST_STUCK * run.problem.solid.n_tets, _TIMES * len(fewest) + _MORE):
+        if len(stuck) > min(MOST_STUCK * run.problem.solid.n_tets, _TIMES * len(fewest) + _MORE):
             break
         if not _inverted(run):
             break  # folded faces are left, which more vertices inside do not unfold
@@ -331,7 +329,7 @@ def _patched(
     stuck = stuck_tets(model, run.x, glide=glide)
     wider = iter(rings or (_RINGS[:1] if run.hasty else _RINGS))
     reach = next(wider)
-    while 0 < len(stuck) <= _MOST_STUCK * len(model.T) and not budget.spent:
+    while 0 < len(stuck) <= MOST_STUCK * len(model.T) and not budget.spent:
         x = untangle_patches(model, run.x, stuck, rings=reach, glide=glide, budget=budget)
         left = stuck_tets(model, x, glide=glide)
         gained = len(left) < len(stuck)

@@ -24,7 +24,14 @@ from .. import _core
 from ..base.budget import Budget
 from .model import FIXED, GLIDING, History, SolidModel
 
-__all__ = ["Untangled", "folded_faces", "stuck_tets", "untangle_patches", "untangle_whole"]
+__all__ = [
+    "MOST_STUCK",
+    "Untangled",
+    "folded_faces",
+    "stuck_tets",
+    "untangle_patches",
+    "untangle_whole",
+]
 
 # Epsilon: determinants are 1 where all is well, a larger one tells nothing apart. But where some
 # are inverted to many times that, one of 1 hides all others behind them, and steps are short. Down
@@ -47,6 +54,10 @@ _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to th
 # all others for as long as there is time.
 _FEW, _FEW_SHARE = 30, 0.01
 _FEW_PATIENCE = 4
+# Inverted tets: with a larger share of all, patches do not help, and another start may. With fewer,
+# so many steps without progress in haste are enough: patches cure in the time of ten steps what
+# thirty more do not.
+MOST_STUCK, _HASTY_PATIENCE = 0.05, 10
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
 # Steps in a row, none longer than that and none with fewer inverted elements than there had been:
 # a few of them are so far off that all others wait for them.
@@ -184,6 +195,12 @@ def untangle_whole(
     # Gliding is a matter of the whole boundary.
     few = 0 if glide or thorough else max(_FEW, int(_FEW_SHARE * len(model.T)))
 
+    def patience(left: int) -> int:
+        if left <= few and not glide:
+            return _FEW_PATIENCE
+        soon = hasty and left <= MOST_STUCK * len(model.T)
+        return min(_HASTY_PATIENCE, o.patience) if soon else o.patience
+
     def note(
         iteration: int, at: NDArray[np.float64], step: _core.volume.NewtonReport, epsilon: float
     ) -> None:
@@ -198,9 +215,7 @@ def untangle_whole(
         face=o.face_weight if glide else 0.0,
         floor=o.floor,
         steps=o.untangle_iter,
-        enough=lambda left, since: (
-            since >= (_FEW_PATIENCE if left <= few and not glide else o.patience)
-        ),
+        enough=lambda left, since: since >= patience(left),
         hasty=hasty,
         from_afar=from_afar,
         linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
