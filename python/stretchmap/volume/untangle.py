@@ -54,9 +54,9 @@ _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to th
 # all others for as long as there is time.
 _FEW, _FEW_SHARE = 30, 0.01
 _FEW_PATIENCE = 4
-# Inverted tets: with a larger share of all, patches do not help, and another start may. With fewer,
-# so many steps without progress in haste are enough: patches cure in the time of ten steps what
-# thirty more do not.
+# Inverted tets: with a larger share of all, patches do not help, and another start may. With fewer
+# and a narrow epsilon, so many steps without progress in haste are enough: patches cure in the time
+# of ten what thirty more do not.
 MOST_STUCK, _HASTY_PATIENCE = 0.05, 10
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
 # Steps in a row, none longer than that and none with fewer inverted elements than there had been:
@@ -109,7 +109,7 @@ def _continue(
     face: float,
     floor: float,
     steps: int,
-    enough: Callable[[int, int], bool],
+    enough: Callable[[int, int, float], bool],
     hasty: bool = False,
     from_afar: bool = False,
     linear: _core.volume.NewtonOptions,
@@ -117,7 +117,7 @@ def _continue(
     note: Callable[[int, NDArray[np.float64], _core.volume.NewtonReport, float], None]
     | None = None,
 ) -> Untangled:
-    """Follow the worst determinant down with epsilon; ``enough(left, since)`` ends it."""
+    """Follow the worst determinant down with epsilon; ``enough(left, since, epsilon)`` ends it."""
     state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
     left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
     # A better worst tet is not worth turning others over for long, nor many steps.
@@ -129,7 +129,7 @@ def _continue(
     for iteration in range(1, steps + 1):
         if (left == 0 and worst >= floor) or ((clean or left == 0) and patience.since >= _ENOUGH):
             break
-        if (left and enough(left, patience.since)) or budget.spent:
+        if (left and enough(left, patience.since, epsilon)) or budget.spent:
             break
         if hasty and short == _JAMMED:
             break
@@ -195,10 +195,10 @@ def untangle_whole(
     # Gliding is a matter of the whole boundary.
     few = 0 if glide or thorough else max(_FEW, int(_FEW_SHARE * len(model.T)))
 
-    def patience(left: int) -> int:
+    def patience(left: int, epsilon: float) -> int:
         if left <= few and not glide:
             return _FEW_PATIENCE
-        soon = hasty and left <= MOST_STUCK * len(model.T)
+        soon = hasty and epsilon <= _NARROW and left <= MOST_STUCK * len(model.T)
         return min(_HASTY_PATIENCE, o.patience) if soon else o.patience
 
     def note(
@@ -215,7 +215,7 @@ def untangle_whole(
         face=o.face_weight if glide else 0.0,
         floor=o.floor,
         steps=o.untangle_iter,
-        enough=lambda left, since: since >= patience(left),
+        enough=lambda left, since, epsilon: since >= patience(left, epsilon),
         hasty=hasty,
         from_afar=from_afar,
         linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
@@ -350,7 +350,7 @@ def untangle_patches(
             face=o.face_weight if boundary is not None else 0.0,
             floor=o.floor,
             steps=_PATCH_STEPS,
-            enough=lambda left, since: since >= _PATCH_PATIENCE,
+            enough=lambda left, since, epsilon: since >= _PATCH_PATIENCE,
             from_afar=True,
             linear=_core.volume.NewtonOptions(tol=1e-2, max_cg=o.max_cg),
             budget=budget,
