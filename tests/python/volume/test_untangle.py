@@ -41,7 +41,7 @@ def paces(left: int, alpha: float = 1.0, face: float = 0.0) -> np.ndarray:
     newton = Dragging(left, alpha)
     _continue(
         newton, np.zeros((1, 3)), face=face, floor=0.005, steps=10,
-        enough=lambda _left, _since: False, linear=None, budget=Budget(60.0),
+        enough=lambda *_: False, linear=None, budget=Budget(60.0),
     )  # fmt: skip
     chi = 0.5 * (-0.01 + np.sqrt(np.square(newton.epsilons) + 1e-4))
     return chi[1:] / chi[:-1]
@@ -64,7 +64,7 @@ def followed(worst: float, *, alpha: float = 1.0, face: float = 0.0, **given) ->
     newton = Dragging(500, alpha, worst=worst)
     _continue(
         newton, np.zeros((1, 3)), face=face, floor=0.02, steps=900,
-        enough=lambda _left, since: since >= 40, linear=None, budget=Budget(60.0), **given,
+        enough=lambda _, since, *__: since >= 40, linear=None, budget=Budget(60.0), **given,
     )  # fmt: skip
     return np.array(newton.epsilons)
 
@@ -99,7 +99,7 @@ def test_in_haste_single_elements_less_are_no_progress(cured, hasty, steps):
     newton = Slow(100, worst=-0.01)
     _continue(
         newton, np.zeros((1, 3)), face=0.0, floor=0.005, steps=11, hasty=hasty,
-        enough=lambda _left, since: since >= 6, linear=None, budget=Budget(60.0),
+        enough=lambda _left, since, _epsilon: since >= 6, linear=None, budget=Budget(60.0),
     )  # fmt: skip
     assert len(newton.epsilons) == steps
 
@@ -154,7 +154,7 @@ def test_what_is_untangled_is_not_turned_over_for_a_better_worst_tet(kind):
     newton = kind(0, worst=1e-4)
     found = _continue(
         newton, np.zeros((1, 3)), face=1.0, floor=0.02, steps=100,
-        enough=lambda _left, _since: False, linear=None, budget=Budget(60.0),
+        enough=lambda *_: False, linear=None, budget=Budget(60.0),
     )  # fmt: skip
     assert (found.left, found.worst) == (0, 1e-4)
     assert newton.epsilons[0] == 0.02 and len(newton.epsilons) <= 7
@@ -172,7 +172,7 @@ def test_a_better_worst_tet_is_worth_a_few_steps():
     newton = Improving(0, worst=1e-4)
     found = _continue(
         newton, np.zeros((1, 3)), face=1.0, floor=0.02, steps=100,
-        enough=lambda _left, _since: False, linear=None, budget=Budget(60.0),
+        enough=lambda *_: False, linear=None, budget=Budget(60.0),
     )  # fmt: skip
     assert len(newton.epsilons) == 6 and found.worst == pytest.approx(1e-4 * 1.1**6)
 
@@ -250,7 +250,7 @@ def test_what_single_tets_hold_up_is_left_to_the_patches(given, steps):
         newton = Jammed(500, alpha)
         _continue(
             newton, np.zeros((1, 3)), face=0.0, floor=0.02, steps=20, hasty=hasty,
-            enough=lambda _left, _since: False, linear=None, budget=Budget(60.0),
+            enough=lambda *_: False, linear=None, budget=Budget(60.0),
         )  # fmt: skip
         assert len(newton.epsilons) == (steps if hasty else 20)
 
@@ -291,8 +291,30 @@ def test_a_hundredth_of_the_tets_is_soon_left_to_patches(monkeypatch, left):
     )
     untangle.untangle_whole(run.history.model, run.x, run.history, glide=False)
     share = left / 12_000 * run.problem.solid.n_tets
-    assert asked[0](int(share), 4) == (left < 120)
-    assert not asked[0](int(share), 3)
+    assert asked[0](int(share), 4, 1.0) == (left < 120)
+    assert not asked[0](int(share), 3, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("share", "epsilon", "hasty", "steps"),
+    [
+        (0.04, 0.05, True, 10),
+        (0.04, 0.5, True, 30),
+        (0.06, 0.05, True, 30),
+        (0.04, 0.05, False, 30),
+    ],
+)
+def test_in_haste_patches_come_soon_once_epsilon_is_narrow(
+    monkeypatch, share, epsilon, hasty, steps
+):
+    run = run_of(sm.samples.bumpy_torus(6000))
+    asked = []
+    monkeypatch.setattr(
+        untangle, "_continue", lambda *_, enough, **__: asked.append(enough) or None
+    )
+    untangle.untangle_whole(run.history.model, run.x, run.history, glide=False, hasty=hasty)
+    left = int(share * len(run.history.model.T))
+    assert asked[0](left, steps, epsilon) and not asked[0](left, steps - 1, epsilon)
 
 
 @pytest.mark.parametrize(("left", "rounds"), [(90, 2), (110, 1)])
