@@ -54,9 +54,11 @@ _ENOUGH = 6  # steps without progress once nothing is inverted, on the way to th
 # all others for as long as there is time.
 _FEW, _FEW_SHARE = 30, 0.01
 _FEW_PATIENCE = 4
-# Inverted tets: with a larger share of all, patches do not help, and another start may. With fewer
-# and a narrow epsilon, so many steps without progress in haste are enough: patches cure in the time
-# of ten what thirty more do not.
+# Inverted tets: with a larger share of all, patches do not help, and another start may. With fewer,
+# so many steps without progress in haste are enough: patches cure in the time of ten what thirty
+# more do not. Not before epsilon is narrow, though: down to there more turn over, and patches made
+# of those are given up. Then steps on the way count as well: who has not got further by there is
+# served better by patches.
 MOST_STUCK, _HASTY_PATIENCE = 0.05, 10
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
 # Steps in a row, none longer than that and none with fewer inverted elements than there had been:

@@ -317,6 +317,26 @@ def test_in_haste_patches_come_soon_once_epsilon_is_narrow(
     assert asked[0](left, steps, epsilon) and not asked[0](left, steps - 1, epsilon)
 
 
+@pytest.mark.parametrize(("stuck", "tried"), [(55, True), (65, False)])
+def test_some_stuck_tets_are_worth_a_gliding_boundary_before_another_start(
+    monkeypatch, stuck, tried
+):
+    run = run_of(sm.samples.bumpy_torus(600))
+    run.hasty, gliding = True, []
+    monkeypatch.setattr(engine, "untangle_whole", lambda _, x, *a, **k: Untangled(x, stuck, -1.0))
+    monkeypatch.setattr(engine, "_inverted", lambda run: 0)
+
+    def patched(run, *, glide, few=0, rings=()):
+        gliding.extend([rings] if glide else [])
+        return np.arange(stuck)
+
+    monkeypatch.setattr(engine, "_patched", patched)
+    monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: np.arange(stuck))
+    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck: stuck)
+    assert len(engine._untangle_inside(run, glide=True)) == stuck
+    assert gliding == ([(), (8,)] if tried else [])
+
+
 @pytest.mark.parametrize(("left", "rounds"), [(90, 2), (110, 1)])
 def test_what_patches_were_curing_when_time_was_up_is_gone_on_with(monkeypatch, left, rounds):
     run = run_of(sm.samples.bumpy_torus(6000))
