@@ -61,7 +61,8 @@ def equalize(
     for iteration in range(total):
         if history.budget.spent:
             break
-        if iteration < o.target_iter:
+        shifting = iteration >= o.target_iter
+        if not shifting:
             if marginals.error(measured) < o.marginal_tol:
                 continue
             newton.set_targets(marginals.targets(measured))
@@ -77,7 +78,6 @@ def equalize(
             break
         before, measured = marginals.error(measured), marginals.measure(moved)
         gain = 1.0 - marginals.error(measured) / before if before > 0.0 else 0.0
-        shifting = iteration >= o.target_iter
         if shifting and gain <= 0.0:
             break
         x = moved
