@@ -117,7 +117,7 @@ EnergyReport SolidEnergy::summed(const Energies& found) {
 
 // Adds the tet's share to the rows in [first, last).
 void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
-                              Points& gradient, double* blocks) const {
+                              Points& gradient, linalg::BlockMatrix* hessian) const {
   std::array<Index, 4> row;
   std::array<bool, 4> mine;
   for (int a = 0; a < 4; ++a) {
@@ -132,16 +132,18 @@ void SolidEnergy::add_element(const ElementBatch& batch, int lane, Index t, Inde
     if (mine[a + 1]) gradient.row(row[a + 1]) += g;
   }
   if (mine[0]) gradient.row(row[0]) -= others;
-  if (!blocks) return;
+  if (!hessian) return;
 
+  double* blocks = hessian->values.data();
   Block3 H[4][4];
   tet_blocks(batch, lane, 1.0, H);
   for (int a = 0; a < 4; ++a) {
     if (!mine[a]) continue;
     for (int b = 0; b < 4; ++b) {
       if (row[b] < 0) continue;
-      const std::uint16_t place = place_(t, 4 * a + b);
-      const Index slot = place < kFar ? row_ptr_[row[a]] + place : find_block(row[a], row[b]);
+      const std::uint8_t place = place_(t, 4 * a + b);
+      const Index slot =
+          place < kFar ? row_ptr_[row[a]] + place : find_block(hessian->col, row[a], row[b]);
       add_block(H[a][b], blocks + 9 * static_cast<std::ptrdiff_t>(slot));
     }
   }
@@ -161,36 +163,36 @@ void SolidEnergy::model(const PointsRef& x, const EnergyWeights& w, Points& grad
         x, w, 0, static_cast<Index>(list.size()), blocks ? element_models : element_gradients,
         [&](Index position) { return list[position]; },
         [&](Index t, int lane, const ElementBatch& batch) {
-          add_element(batch, lane, t, part_row_[p], part_row_[p + 1], gradient, blocks);
+          add_element(batch, lane, t, part_row_[p], part_row_[p + 1], gradient, hessian);
         });
   });
   if ((motion_.array() != kGliding).all()) return;
   const Index n_rows = rows();
   const GlideSites at = sites(x, true);
   for_rows(n_rows, kElementChunk,
-           [&](Index row) { into_frames(x, at, w.negative, row, gradient, blocks); });
+           [&](Index row) { into_frames(x, at, w.negative, row, gradient, hessian); });
   if (w.face <= 0.0) return;
   for_tasks(parts, [&](Index p) {
     for (const Index f : part_faces_[p])
-      add_face(x, at, w, f, part_row_[p], part_row_[p + 1], gradient, blocks);
+      add_face(x, at, w, f, part_row_[p], part_row_[p + 1], gradient, hessian);
   });
 }
 
 // Adds the boundary triangle's share to the rows in [first, last), which are in frames already.
 void SolidEnergy::add_face(const PointsRef& x, const GlideSites& sites, const EnergyWeights& w,
                            Index f, Index first, Index last, Points& gradient,
-                           double* blocks) const {
+                           linalg::BlockMatrix* hessian) const {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> H = Eigen::Matrix<double, 6, 6>::Zero();
-  barrier_.model(x, sites, f, w.epsilon, g, blocks ? &H : nullptr);
+  barrier_.model(x, sites, f, w.epsilon, g, hessian ? &H : nullptr);
   for (int a = 0; a < 3; ++a) {
     const Index row = vertex_row_[barrier_.faces()(f, a)];
     if (row < first || row >= last) continue;
     gradient.row(row).head<2>() += w.face * g.segment<2>(2 * a).transpose();
-    for (int b = 0; blocks && b < 3; ++b)
+    for (int b = 0; hessian && b < 3; ++b)
       if (const Index slot = face_slot_(f, 3 * a + b); slot >= 0)
-        Block(blocks + 9 * static_cast<std::ptrdiff_t>(slot)).topLeftCorner<2, 2>() +=
-            w.face * H.block<2, 2>(2 * a, 2 * b);
+        Block(hessian->values.data() + 9 * static_cast<std::ptrdiff_t>(slot))
+            .topLeftCorner<2, 2>() += w.face * H.block<2, 2>(2 * a, 2 * b);
   }
 }
 
@@ -207,15 +209,15 @@ Matrix3d SolidEnergy::frame(const GlideSites& sites, Index vertex) const {
 // Rewrites one block row in vertex frames and, for a gliding vertex, adds the surface's own second
 // derivatives (of negative eigenvalues a share) and removes the normal unknown.
 void SolidEnergy::into_frames(const PointsRef& x, const GlideSites& sites, double negative,
-                              Index row, Points& gradient, double* blocks) const {
+                              Index row, Points& gradient, linalg::BlockMatrix* hessian) const {
   const Index vertex = row_vertex_[row];
   const Matrix3d Q = frame(sites, vertex);
   const bool gliding = motion_[vertex] == kGliding;
   const Vector3d g = Q.transpose() * gradient.row(row).transpose();
-  for (Index p = row_ptr_[row]; blocks && p < row_ptr_[row + 1]; ++p) {
-    const Index other = row_vertex_[col_[p]];
+  for (Index p = row_ptr_[row]; hessian && p < row_ptr_[row + 1]; ++p) {
+    const Index other = row_vertex_[hessian->col[p]];
     if (!gliding && motion_[other] != kGliding) continue;
-    Block block(blocks + 9 * static_cast<std::ptrdiff_t>(p));
+    Block block(hessian->values.data() + 9 * static_cast<std::ptrdiff_t>(p));
     Matrix3d turned = Q.transpose() * block * frame(sites, other);
     if (gliding) turned.row(2).setZero();
     if (motion_[other] == kGliding) turned.col(2).setZero();

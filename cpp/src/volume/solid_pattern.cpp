@@ -73,7 +73,7 @@ void SolidEnergy::number_sites() {
   site_place_.assign(site_vertex_.size(), -1);
 }
 
-void SolidEnergy::build_pattern() {
+linalg::BlockMatrix SolidEnergy::build_pattern() {
   const Index n_rows = rows(), k = static_cast<Index>(tets_.rows());
   const Incidence<> corners =
       corners_at(tets_, n_rows, [&](Index vertex) { return vertex_row_[vertex]; });
@@ -89,8 +89,10 @@ void SolidEnergy::build_pattern() {
         set.add(row);
         for_corners(row, [&](Index, int, Index other) { set.add(other); });
       });
-  row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n_rows + 1);
-  col_ = Eigen::Map<const IndexVec>(pattern.col.data(), static_cast<Index>(pattern.col.size()));
+  linalg::BlockMatrix matrix;
+  matrix.row_ptr = row_ptr_ = Eigen::Map<const IndexVec>(pattern.start.data(), n_rows + 1);
+  matrix.col =
+      Eigen::Map<const IndexVec>(pattern.col.data(), static_cast<Index>(pattern.col.size()));
 
   place_.setZero(k, 16);
   for_chunks_with(
@@ -98,15 +100,16 @@ void SolidEnergy::build_pattern() {
       [&](Index begin, Index end, std::vector<Index>& place) {
         for (Index row = begin; row < end; ++row) {
           for (Index p = row_ptr_[row]; p < row_ptr_[row + 1]; ++p)
-            place[col_[p]] = std::min<Index>(p - row_ptr_[row], kFar);
+            place[pattern.col[p]] = std::min<Index>(p - row_ptr_[row], kFar);
           for_corners(row, [&](Index at, int b, Index other) {
-            place_(at / 4, 4 * (at % 4) + b) = static_cast<std::uint16_t>(place[other]);
+            place_(at / 4, 4 * (at % 4) + b) = static_cast<std::uint8_t>(place[other]);
           });
         }
       });
+  return matrix;
 }
 
-void SolidEnergy::find_face_slots() {
+void SolidEnergy::find_face_slots(const IndexVec& col) {
   const Index m = barrier_.size();
   face_slot_.setConstant(m, 9, -1);
   for (Index f = 0; f < m; ++f)
@@ -114,7 +117,7 @@ void SolidEnergy::find_face_slots() {
       for (int b = 0; b < 3; ++b) {
         const Index row = vertex_row_[barrier_.faces()(f, a)];
         const Index column = vertex_row_[barrier_.faces()(f, b)];
-        if (row >= 0 && column >= 0) face_slot_(f, 3 * a + b) = find_block(row, column);
+        if (row >= 0 && column >= 0) face_slot_(f, 3 * a + b) = find_block(col, row, column);
       }
 }
 
@@ -140,22 +143,17 @@ void SolidEnergy::part_rows() {
   part_faces_ = touching(barrier_.faces());
 }
 
-Index SolidEnergy::find_block(Index row, Index column) const {
-  const Index* first = col_.data() + row_ptr_[row];
-  const Index* last = col_.data() + row_ptr_[row + 1];
-  return static_cast<Index>(std::lower_bound(first, last, column) - col_.data());
+Index SolidEnergy::find_block(const IndexVec& col, Index row, Index column) const {
+  const Index* first = col.data() + row_ptr_[row];
+  const Index* last = col.data() + row_ptr_[row + 1];
+  return static_cast<Index>(std::lower_bound(first, last, column) - col.data());
 }
 
 linalg::BlockMatrix SolidEnergy::pattern() {
-  if (row_ptr_.size() == 0) {
-    build_pattern();
-    find_face_slots();
-    part_rows();
-  }
-  linalg::BlockMatrix matrix;
-  matrix.row_ptr = row_ptr_;
-  matrix.col = col_;
-  matrix.values.resize(9 * col_.size());
+  linalg::BlockMatrix matrix = build_pattern();
+  find_face_slots(matrix.col);
+  part_rows();
+  matrix.values.resize(9 * matrix.col.size());
   return matrix;
 }
 

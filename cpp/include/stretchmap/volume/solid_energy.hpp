@@ -62,7 +62,8 @@ class SolidEnergy {
 
   Index tets() const { return static_cast<Index>(tets_.rows()); }
   Index rows() const { return static_cast<Index>(row_vertex_.size()); }
-  // Of the Hessian, values zero. Found when it is first asked for: an energy may only be looked at.
+  // Of the Hessian, values yet to be set. Found when it is asked for: an energy may only be looked
+  // at.
   linalg::BlockMatrix pattern();
 
   // From now on J is multiplied by target^(-1/3): det J = 1 where a tet has `target` times the
@@ -122,18 +123,19 @@ class SolidEnergy {
   static HeldUp harmed(const Energies& before, const Energies& after, double most);
   void shorten(const HeldUp& at, Points& step) const;
   void number_sites();
-  void build_pattern();
-  void find_face_slots();
+  linalg::BlockMatrix build_pattern();
+  void find_face_slots(const IndexVec& col);
   void part_rows();
-  Index find_block(Index row, Index column) const;  // position in col_
+  // Position of a column of a row among all columns, `col`.
+  Index find_block(const IndexVec& col, Index row, Index column) const;
   void add_element(const ElementBatch& batch, int lane, Index t, Index first, Index last,
-                   Points& gradient, double* blocks) const;
+                   Points& gradient, linalg::BlockMatrix* hessian) const;
   void add_face(const PointsRef& x, const GlideSites& sites, const EnergyWeights& w, Index f,
-                Index first, Index last, Points& gradient, double* blocks) const;
+                Index first, Index last, Points& gradient, linalg::BlockMatrix* hessian) const;
   void into_frames(const PointsRef& x, const GlideSites& sites, double negative, Index row,
-                   Points& gradient, double* blocks) const;
+                   Points& gradient, linalg::BlockMatrix* hessian) const;
 
-  static constexpr std::uint16_t kFar = 0xFFFF;
+  static constexpr std::uint8_t kFar = 0xFF;
   Tets tets_;       // sorted by lowest row
   IndexVec order_;  // which of the tets given each of them is
   Vec target_;      // (k) in the sorted order; empty: ones
@@ -146,9 +148,9 @@ class SolidEnergy {
   mutable std::vector<Index> site_place_;  // of each of them when last looked for, -1 at first
   IndexVec row_vertex_;                    // vertex of each row
   IndexVec vertex_row_;                    // row of each vertex, -1 if fixed
-  IndexVec row_ptr_, col_;                 // block pattern
+  IndexVec row_ptr_;                       // of the block pattern
   // (k, 16) position within the row of each pair of a tet's vertices, kFar if it is beyond reach.
-  Eigen::Matrix<std::uint16_t, Eigen::Dynamic, 16, Eigen::RowMajor> place_;
+  Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 16, Eigen::RowMajor> place_;
   IndexRows face_slot_;          // (m, 9) block of each pair of a face's vertices, -1 if none
   std::vector<Index> part_row_;  // rows of part p: [part_row_[p], part_row_[p + 1])
   std::vector<std::vector<Index>> part_tets_;   // tets that touch them, ascending
