@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..base.budget import Budget
 from ..base.progress import Progress
 from ..maps.history import IterationRecord
@@ -152,6 +153,8 @@ def _climb(
     if route.finish == "none":
         return made
     clock = time.perf_counter()
+    # What the chart's solves used is in pieces, and the factors to come are large.
+    _core.base.give_free_memory_back()
     pace = Pace()
     for level in reversed(stack):
         finest = level is stack[0]
