@@ -28,7 +28,7 @@ IterativeSolver<B, M>::IterativeSolver(Index n, const Index* start, const Index*
 
 template <int B, int M>
 void IterativeSolver<B, M>::set_scale() {
-  const std::vector<Index>& diagonal = multigrid_.finest().diagonal_source;
+  const Buffer<Index>& diagonal = multigrid_.finest().diagonal_source;
   const double largest = -least_of(matrix_.n, 0.0, [&](Index i) {
     const double* block = matrix_.value + static_cast<size_t>(B * B) * diagonal[i];
     double most = block[0];

@@ -109,12 +109,8 @@ FacetGroups group(const Elements& elements, const int (&facet)[F][N], Index n, c
           }
         });
   }
-  std::size_t count = 0;
-  for (const std::vector<Index>& start : starts) count += start.size();
-  groups.start.reserve(count + 1);
-  for (const std::vector<Index>& start : starts)
-    groups.start.insert(groups.start.end(), start.begin(), start.end());
-  groups.start.push_back(static_cast<Index>(groups.order.size()));
+  groups.start = joined(starts, 1);
+  groups.start.back() = static_cast<Index>(groups.order.size());
   return groups;
 }
 

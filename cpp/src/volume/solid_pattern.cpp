@@ -94,7 +94,7 @@ linalg::BlockMatrix SolidEnergy::build_pattern() {
   matrix.col =
       Eigen::Map<const IndexVec>(pattern.col.data(), static_cast<Index>(pattern.col.size()));
 
-  place_.setZero(k, 16);
+  place_.resize(k, 16);  // those without a row are never looked at
   for_chunks_with(
       n_rows, kChunk, [&] { return std::vector<Index>(n_rows); },
       [&](Index begin, Index end, std::vector<Index>& place) {

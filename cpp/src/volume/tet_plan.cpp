@@ -17,11 +17,11 @@ constexpr int kEdge[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4,
 
 // The mesh in internal numbering.
 struct Numbered {
-  std::vector<Index> order;      // internal vertex -> caller's
-  std::vector<Index> tet;        // internal tet -> caller's
-  std::vector<Index> corners;    // 4 per internal tet
-  std::vector<Index> first_tet;  // per internal vertex, plus one: tets with a lower lowest vertex
-  std::vector<Index> row;        // internal vertex -> row, -1 if prescribed
+  Buffer<Index> order;      // internal vertex -> caller's
+  Buffer<Index> tet;        // internal tet -> caller's
+  Buffer<Index> corners;    // 4 per internal tet
+  Buffer<Index> first_tet;  // per internal vertex, plus one: tets with a lower lowest vertex
+  Buffer<Index> row;        // internal vertex -> row, -1 if prescribed
 };
 
 Numbered breadth_first(const TetsRef& tets, const FlagsRef& fixed) {
@@ -296,8 +296,9 @@ void Builder::fill_chunk(Index chunk, const std::vector<Index>& seam) {
 
 double TetPlan::index_bytes() const {
   double count = 0.0;
-  for (const auto* indices : {&order, &outer, &slots, &lower_start, &lower_slot, &row_slot,
-                              &couple_start, &couple_vertex})
+  for (const auto* starts : {&outer, &lower_start, &couple_start})
+    count += static_cast<double>(starts->size());
+  for (const auto* indices : {&order, &slots, &lower_slot, &row_slot, &couple_vertex})
     count += static_cast<double>(indices->size());
   return sizeof(Index) * count;
 }

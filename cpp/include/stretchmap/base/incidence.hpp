@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "stretchmap/base/parallel.hpp"
@@ -31,23 +32,15 @@ class Incidence {
   // ...
   template <class Enumerate>
   Incidence(Index n, Index parts, const Enumerate& enumerate)
-      : start_(static_cast<std::size_t>(n) + 1, 0) {
+      : start_(static_cast<std::size_t>(n) + 1) {
     const auto things = static_cast<std::size_t>(n);
-    std::vector<Offset> next(things * static_cast<std::size_t>(parts), 0);
+    Buffer<Offset> next(things * static_cast<std::size_t>(parts));
     for_tasks(parts, [&](Index part) {
       Offset* count = next.data() + things * static_cast<std::size_t>(part);
+      std::fill_n(count, things, Offset{0});
       enumerate(part, [&](Index thing, const Item&) { ++count[thing]; });
     });
-    Offset total = 0;
-    for (std::size_t i = 0; i < things; ++i) {
-      start_[i] = total;
-      for (std::size_t at = i; at < next.size(); at += things) {
-        const Offset count = next[at];
-        next[at] = total;
-        total += count;
-      }
-    }
-    start_[things] = total;
+    const Offset total = number(n, next);
     items_.resize(static_cast<std::size_t>(total));
     for_tasks(parts, [&](Index part) {
       Offset* to = next.data() + things * static_cast<std::size_t>(part);
@@ -68,18 +61,41 @@ class Incidence {
   }
 
  private:
-  std::vector<Offset> start_;  // (n + 1)
-  std::vector<Item> items_;
+  // Where the items of each thing start, from how many each part has of it; `next` becomes where
+  // those of each part start. Returns their number.
+  Offset number(Index n, Buffer<Offset>& next) {
+    std::vector<Offset> before(static_cast<std::size_t>(chunk_count(n)) + 1, 0);
+    const auto of_all_parts = [&](Index thing, const auto& visit) {
+      for (std::size_t at = thing; at < next.size(); at += static_cast<std::size_t>(n))
+        visit(next[at]);
+    };
+    for_chunks(n, [&](Index begin, Index end) {
+      Offset& sum = before[begin / kChunk + 1];
+      for (Index i = begin; i < end; ++i) of_all_parts(i, [&](Offset count) { sum += count; });
+    });
+    for (std::size_t c = 1; c < before.size(); ++c) before[c] += before[c - 1];
+    for_chunks(n, [&](Index begin, Index end) {
+      Offset total = before[begin / kChunk];
+      for (Index i = begin; i < end; ++i) {
+        start_[i] = total;
+        of_all_parts(i, [&](Offset& count) { total += std::exchange(count, total); });
+      }
+    });
+    return start_[n] = before.back();
+  }
+
+  Buffer<Offset> start_;  // (n + 1)
+  Buffer<Item> items_;
 };
 
 // (n) what m elements have at each of n things, in their order: each(element, visit) calls
 // visit(thing, item), the same ones both times it is called.
-template <class Each>
-Incidence<> listed_at(Index n, Index m, const Each& each) {
+template <class Item = Index, class Each>
+Incidence<Item> listed_at(Index n, Index m, const Each& each) {
   constexpr Index kLeast = 16384, kMost = 8;  // elements of a part, parts
   const Index parts = std::clamp(chunk_count(m, kLeast), Index{1}, kMost);
   const Index size = chunk_count(m, parts);
-  return Incidence<>(n, parts, [&](Index part, const auto& visit) {
+  return Incidence<Item>(n, parts, [&](Index part, const auto& visit) {
     for (Index e = part * size; e < std::min(m, (part + 1) * size); ++e) each(e, visit);
   });
 }

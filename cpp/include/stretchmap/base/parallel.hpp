@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "stretchmap/base/buffer.hpp"
 #include "stretchmap/base/threads.hpp"
 #include "stretchmap/base/types.hpp"
 
@@ -110,6 +111,17 @@ double least_of(Index n, double most, const Value& value) {
   });
   for (const double other : least) most = std::min(most, other);
   return most;
+}
+
+// The parts one after the other, and `more` numbers unset.
+template <class T>
+Buffer<T> joined(const std::vector<std::vector<T>>& parts, std::size_t more = 0) {
+  std::vector<std::size_t> start{0};
+  for (const std::vector<T>& part : parts) start.push_back(start.back() + part.size());
+  Buffer<T> all(start.back() + more);
+  for_rows(static_cast<Index>(parts.size()), 4,
+           [&](Index p) { std::copy(parts[p].begin(), parts[p].end(), all.begin() + start[p]); });
+  return all;
 }
 
 }  // namespace stretchmap

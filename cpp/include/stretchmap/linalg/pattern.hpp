@@ -12,7 +12,7 @@ namespace stretchmap::linalg {
 struct Pattern {
   Index columns = 0;
   std::vector<Index> start{0};  // (rows + 1)
-  std::vector<Index> col;
+  Buffer<Index> col;
 
   Index rows() const { return static_cast<Index>(start.size()) - 1; }
 };
@@ -58,11 +58,7 @@ Pattern build_pattern(Index rows, Index columns, const Collect& collect) {
         }
       });
   for (Index i = 0; i < rows; ++i) pattern.start[i + 1] += pattern.start[i];
-  pattern.col.resize(static_cast<std::size_t>(pattern.start[rows]));
-  for_chunks(rows, kElementChunk, [&](Index begin, Index) {
-    const std::vector<Index>& part = parts[begin / kElementChunk];
-    std::copy(part.begin(), part.end(), pattern.col.begin() + pattern.start[begin]);
-  });
+  pattern.col = joined(parts);
   return pattern;
 }
 

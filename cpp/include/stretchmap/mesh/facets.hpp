@@ -15,9 +15,10 @@ inline constexpr int kTetFace[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1
 inline constexpr int kTetEdge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 struct FacetGroups {
-  std::vector<Index> order;  // facets, equal ones side by side; groups in lexicographic order of
-                             // their sorted vertex ids, members in ascending order
-  std::vector<Index> start;  // (g + 1) where each group begins in `order`
+  // Facets, equal ones side by side; groups in lexicographic order of their sorted vertex ids,
+  // members in ascending order.
+  Buffer<Index> order;
+  Buffer<Index> start;  // (g + 1) where each group begins in `order`
   Index size() const { return static_cast<Index>(start.size()) - 1; }
 };
 

@@ -12,28 +12,31 @@
 #include <cstdint>
 #include <vector>
 
+#include "stretchmap/base/buffer.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap::volume {
 
 struct TetPlan {
-  std::vector<Index> order;  // caller's vertex of each internal one
-  IndexVec interior;         // caller's vertex of each row
+  Buffer<Index> order;  // caller's vertex of each internal one
+  IndexVec interior;    // caller's vertex of each row
 
-  std::vector<Index> outer, inner;  // the matrix pattern
+  std::vector<Index> outer;  // the matrix pattern
+  Buffer<Index> inner;
 
   // The tets of chunk c are [chunk_tet[c], chunk_tet[c + 1]), a multiple of the kernel's group; its
   // slots are [chunk_slot[c], chunk_slot[c + 1]), the last of which is never read.
   std::vector<std::int64_t> chunk_tet;
   std::vector<Index> chunk_slot;
-  std::vector<Index> corners;  // 4 per tet, internal vertices
-  std::vector<double> rest;    // volume per tet
-  std::vector<Index> slots;    // 6 per tet
+  Buffer<Index> corners;  // 4 per tet, internal vertices
+  Buffer<double> rest;    // volume per tet
+  Buffer<Index> slots;    // 6 per tet
 
   // The entries of row r before the diagonal have the slots lower_slot[lower_start[r] ...], those
   // after it and then its prescribed neighbors successive ones from row_slot[r] on.
-  std::vector<Index> lower_start, lower_slot, row_slot;
-  std::vector<Index> couple_start, couple_vertex;  // prescribed neighbors, the caller's vertices
+  std::vector<Index> lower_start, couple_start;
+  Buffer<Index> lower_slot, row_slot;
+  Buffer<Index> couple_vertex;  // prescribed neighbors, the caller's vertices
 
   Index rows() const { return static_cast<Index>(interior.size()); }
   Index chunks() const { return static_cast<Index>(chunk_slot.size()) - 1; }

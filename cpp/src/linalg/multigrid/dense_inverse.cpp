@@ -14,7 +14,7 @@ constexpr Index kLargest = 3000;  // unknowns; more are not inverted, even if co
 
 }  // namespace
 
-void DenseInverse::set(const Pattern& pattern, const std::vector<double>& values, int block) {
+void DenseInverse::set(const Pattern& pattern, const Buffer<double>& values, int block) {
   n_ = pattern.rows() * block;
   inverse_.clear();
   if (n_ > kLargest) return;

@@ -12,7 +12,7 @@ class DenseInverse {
  public:
   // The matrix in compressed rows with blocks of `block` unknowns; a matrix that is not positive
   // definite is replaced by the one with the absolute values of its eigenvalues.
-  void set(const Pattern& pattern, const std::vector<double>& values, int block);
+  void set(const Pattern& pattern, const Buffer<double>& values, int block);
   // x = inverse times b for N = 1, 2 or 4 interleaved columns; zero where there is no inverse.
   template <int N>
   void apply(const float* b, float* x) const;

@@ -94,6 +94,7 @@ void LevelMatrix<B>::set_sweep_pattern() {
     const auto count = static_cast<size_t>(entries->start[n]);
     entries->col.resize(count);
     entries->value.resize(static_cast<size_t>(B * B) * count + kPadding);
+    std::fill_n(entries->value.end() - kPadding, kPadding, 0.0f);
   }
   for_chunks(n, kRows, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
@@ -128,6 +129,7 @@ template <int B>
 std::vector<Index> LevelMatrix<B>::set_diagonals() {
   constexpr size_t kSize = B * B;
   inverse_f.resize(kSize * n + kPadding);
+  std::fill_n(inverse_f.end() - kPadding, kPadding, 0.0f);
   std::vector<char> bad(n, 0);
   for_chunks(n, kRows, [&](Index begin, Index end) {
     for (size_t i = begin; i < static_cast<size_t>(end); ++i) {

@@ -20,8 +20,9 @@ inline constexpr std::size_t kPadding = 3;  // numbers the sweeps may read beyon
 
 // Entries of all rows, one row after the other, in single precision.
 struct SweepEntries {
-  std::vector<Index> start, col;
-  std::vector<float> value;  // column-major blocks, and kPadding more numbers
+  std::vector<Index> start;
+  Buffer<Index> col;
+  Buffer<float> value;  // column-major blocks, and kPadding more numbers
 };
 
 template <int B>
@@ -31,15 +32,16 @@ struct LevelMatrix {
   static constexpr Index kRows = kChunk / (B * B);  // at once, where chunks do not matter
   // Entries of row i: [start[i], lower[i]) other chunks, [lower[i], upper[i]) earlier columns,
   // [upper[i], start[i + 1]) later columns.
-  std::vector<Index> start, lower, upper, col;
-  std::vector<Index> source, diagonal_source;  // where the values come from, see set_values
-  const double* values = nullptr;              // those, and what they are multiplied by
+  std::vector<Index> start;
+  Buffer<Index> lower, upper, col;
+  Buffer<Index> source, diagonal_source;  // where the values come from, see set_values
+  const double* values = nullptr;         // those, and what they are multiplied by
   double scale = 1.0;
-  std::vector<double> diagonal;  // row-major blocks, multiplied
+  Buffer<double> diagonal;  // row-major blocks, multiplied
   // Earlier columns of the same chunk; all others, the later ones of row i from later[i] on.
   SweepEntries earlier, rest;
-  std::vector<Index> later;
-  std::vector<float> inverse_f;  // column-major; inverse of the (enlarged) diagonal
+  Buffer<Index> later;
+  Buffer<float> inverse_f;  // column-major; inverse of the (enlarged) diagonal
   // The diagonal is enlarged by 1 / (1 - excess) in rows whose couplings to other chunks would
   // otherwise make the simultaneous sweeps diverge; zero nearly everywhere.
   std::vector<float> excess;

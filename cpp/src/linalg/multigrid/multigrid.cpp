@@ -68,7 +68,7 @@ void Multigrid<B, K>::setup(const std::vector<double>& modes) {
   coarse_.clear();
   std::vector<double> next_modes =
       finest_.transfer.setup(finest_.A, modes, kThreshold, finest_.damping());
-  std::vector<double> values = finest_.transfer.coarse_values(finest_.A);
+  Buffer<double> values = finest_.transfer.coarse_values(finest_.A);
   Index fine_rows = finest_.A.n;
   const Pattern* pattern = &finest_.transfer.coarse;
   while (pattern->rows() * K > kCoarsest && pattern->rows() < 0.8 * fine_rows) {
@@ -87,7 +87,7 @@ void Multigrid<B, K>::setup(const std::vector<double>& modes) {
 
 template <int B, int K>
 void Multigrid<B, K>::refresh() {
-  std::vector<double> values = finest_.transfer.coarse_values(finest_.A);
+  Buffer<double> values = finest_.transfer.coarse_values(finest_.A);
   for (Level<K, K>& level : coarse_) {
     level.A.set_values(values.data());
     values = level.transfer.coarse_values(level.A);

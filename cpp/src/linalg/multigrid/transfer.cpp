@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "linalg/multigrid/block_products.hpp"
+#include "stretchmap/base/incidence.hpp"
 
 namespace stretchmap::linalg {
 namespace {
@@ -15,21 +16,26 @@ using std::size_t;
 constexpr Index kParts = 10;  // of A P: all of it would be the largest array there is
 
 // The transpose of a pattern and, for each of its entries, the entry it came from.
-std::pair<Pattern, std::vector<Index>> transpose(const Pattern& p) {
+std::pair<Pattern, Buffer<Index>> transpose(const Pattern& p) {
+  struct Entry {
+    Index row, at;
+  };
+  const auto entries = listed_at<Entry>(p.columns, p.rows(), [&](Index i, const auto& visit) {
+    for (Index e = p.start[i]; e < p.start[i + 1]; ++e) visit(p.col[e], Entry{i, e});
+  });
   Pattern t;
   t.columns = p.rows();
   t.start.assign(static_cast<size_t>(p.columns) + 1, 0);
-  for (Index c : p.col) ++t.start[c + 1];
-  for (Index c = 0; c < p.columns; ++c) t.start[c + 1] += t.start[c];
   t.col.resize(p.col.size());
-  std::vector<Index> from(p.col.size());
-  std::vector<Index> next(t.start.begin(), t.start.end() - 1);
-  for (Index i = 0; i < p.rows(); ++i)
-    for (Index e = p.start[i]; e < p.start[i + 1]; ++e) {
-      const Index at = next[p.col[e]]++;
-      t.col[at] = i;
-      from[at] = e;
+  Buffer<Index> from(p.col.size());
+  const Entry* const all = entries.of(0, p.columns).begin();
+  for_chunks(p.columns, kChunk / 16, [&](Index begin, Index end) {
+    for (Index c = begin; c < end; ++c) t.start[c + 1] = static_cast<Index>(entries[c].end() - all);
+    for (const Entry& entry : entries.of(begin, end)) {
+      t.col[&entry - all] = entry.row;
+      from[&entry - all] = entry.at;
     }
+  });
   return {std::move(t), std::move(from)};
 }
 
@@ -115,10 +121,11 @@ std::vector<double> Transfer<B, K>::setup(const LevelMatrix<B>& A, const std::ve
   const Aggregates aggregates = aggregate(A, threshold);
   std::vector<double> tentative = modes;
   std::vector<double> coarse_modes = make_orthonormal<B, K>(A.n, aggregates, tentative);
-  const std::vector<Index> r_entry = set_patterns(A, aggregates);
+  const Buffer<Index> r_entry = set_patterns(A, aggregates);
   set_prolongation(A, aggregates, tentative, damping);
   constexpr size_t kSize = static_cast<size_t>(B) * K;
   r_value.resize(p_value.size());
+  r_value.back() = 0.0f;
   for_chunks(r.rows(), kChunk / 16, [&](Index begin, Index end) {
     for (size_t e = r.start[begin]; e < static_cast<size_t>(r.start[end]); ++e)
       for (size_t k = 0; k < kSize; ++k) r_value[kSize * e + k] = p_value[kSize * r_entry[e] + k];
@@ -127,8 +134,7 @@ std::vector<double> Transfer<B, K>::setup(const LevelMatrix<B>& A, const std::ve
 }
 
 template <int B, int K>
-std::vector<Index> Transfer<B, K>::set_patterns(const LevelMatrix<B>& A,
-                                                const Aggregates& aggregates) {
+Buffer<Index> Transfer<B, K>::set_patterns(const LevelMatrix<B>& A, const Aggregates& aggregates) {
   const std::vector<Index>& of = aggregates.of;
   p = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
     if (of[i] >= 0) row.add(of[i]);
@@ -138,7 +144,7 @@ std::vector<Index> Transfer<B, K>::set_patterns(const LevelMatrix<B>& A,
   const auto add_row = [](const Pattern& pattern, Index i, RowSet& row) {
     for (Index e = pattern.start[i]; e < pattern.start[i + 1]; ++e) row.add(pattern.col[e]);
   };
-  std::vector<Index> r_entry;
+  Buffer<Index> r_entry;
   std::tie(r, r_entry) = transpose(p);
   ap = build_pattern(A.n, aggregates.count, [&](Index i, RowSet& row) {
     add_row(p, i, row);
@@ -157,6 +163,7 @@ void Transfer<B, K>::set_prolongation(const LevelMatrix<B>& A, const Aggregates&
   constexpr size_t kSize = static_cast<size_t>(B) * K;
   const std::vector<Index>& of = aggregates.of;
   p_value.resize(kSize * p.col.size() + 1);  // see add_block_products
+  p_value.back() = 0.0f;
   const auto rows = [&](Index begin, Index end, std::vector<Index>& slot) {
     std::vector<double> sum;
     for (Index i = begin; i < end; ++i) {
@@ -231,9 +238,13 @@ void Transfer<B, K>::multiply_rows(const LevelMatrix<B>& A, Index first, Index l
 }
 
 template <int B, int K>
-std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const {
+Buffer<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const {
   constexpr size_t kSize = static_cast<size_t>(B) * K, kCoarse = static_cast<size_t>(K) * K;
-  std::vector<double> values(kCoarse * coarse.col.size(), 0.0);
+  Buffer<double> values(kCoarse * coarse.col.size());
+  for_chunks(coarse.rows(), kChunk / 16, [&](Index begin, Index end) {
+    std::fill(values.begin() + kCoarse * coarse.start[begin],
+              values.begin() + kCoarse * coarse.start[end], 0.0);
+  });
   std::vector<Index> next(r.start.begin(), r.start.end() - 1);  // first entry of r not yet added
   const Index at_once = std::max(kChunk, A.n / kParts + 1);
   Index most = 0;
@@ -275,7 +286,7 @@ std::vector<double> Transfer<B, K>::coarse_values(const LevelMatrix<B>& A) const
 
 // A mode that an aggregate cannot represent: an equation of its own keeps the matrix regular.
 template <int B, int K>
-void Transfer<B, K>::keep_regular(std::vector<double>& values) const {
+void Transfer<B, K>::keep_regular(Buffer<double>& values) const {
   for (Index a = 0; K > 1 && a < coarse.rows(); ++a) {
     const Index* columns = coarse.col.data();
     const Index at = static_cast<Index>(

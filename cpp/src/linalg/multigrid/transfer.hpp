@@ -9,10 +9,10 @@ namespace stretchmap::linalg {
 // of A as well, nearly as well as one made of them, and a third of the work is saved.
 template <int B, int K>
 struct Transfer {
-  Pattern p, r;                // prolongation and its transpose
-  std::vector<float> p_value;  // row-major B x K blocks
-  std::vector<float> r_value;  // the same blocks in the order of r
-  Pattern ap, coarse;          // patterns of A P and of P'AP (with the diagonal)
+  Pattern p, r;           // prolongation and its transpose
+  Buffer<float> p_value;  // row-major B x K blocks
+  Buffer<float> r_value;  // the same blocks in the order of r
+  Pattern ap, coarse;     // patterns of A P and of P'AP (with the diagonal)
 
   // P = (I - damping D^-1 A) T, weak scalar entries of A being added to its diagonal; T has
   // orthonormal columns within each aggregate.
@@ -20,7 +20,7 @@ struct Transfer {
   std::vector<double> setup(const LevelMatrix<B>& A, const std::vector<double>& modes,
                             double threshold, double damping);
   // Values of P'AP in the order of `coarse`, row-major K x K blocks.
-  std::vector<double> coarse_values(const LevelMatrix<B>& A) const;
+  Buffer<double> coarse_values(const LevelMatrix<B>& A) const;
 
   // b = P' r, N columns.
   template <int N>
@@ -31,11 +31,11 @@ struct Transfer {
 
  private:
   // Returns the entry of p behind each entry of r.
-  std::vector<Index> set_patterns(const LevelMatrix<B>& A, const Aggregates& aggregates);
+  Buffer<Index> set_patterns(const LevelMatrix<B>& A, const Aggregates& aggregates);
   void set_prolongation(const LevelMatrix<B>& A, const Aggregates& aggregates,
                         const std::vector<double>& tentative, double damping);
   void multiply_rows(const LevelMatrix<B>& A, Index first, Index last, double* product) const;
-  void keep_regular(std::vector<double>& values) const;
+  void keep_regular(Buffer<double>& values) const;
 };
 
 }  // namespace stretchmap::linalg
