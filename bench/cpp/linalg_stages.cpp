@@ -40,7 +40,8 @@ void backend_stage(const std::string& backend, const System& system, const Solid
   Record row = measure(
       row_name(name + "setup", solid, settings),
       [&] {
-        solver = std::make_unique<linalg::SpdSolver>(system.matrix, linalg::SpdOptions{backend});
+        solver = std::make_unique<linalg::SpdSolver>(SparseMatrix(system.matrix),
+                                                     linalg::SpdOptions{backend});
       },
       0.3, 5);
   row.counters = {{"rows", rows}, {"entries", double(system.matrix.nonZeros())}};

@@ -24,7 +24,7 @@ void bind(py::module_& m) {
       .def_readonly("negative_curvature", &SolveReport::negative_curvature);
   py::class_<SpdSolver>(m, "SpdSolver")
       .def(py::init([](const SparseMatrix& A, const std::string& backend) {
-             return SpdSolver(A, SpdOptions{backend});
+             return SpdSolver(SparseMatrix(A), SpdOptions{backend});
            }),
            py::arg("matrix"), py::arg("backend") = "auto", release_gil())
       .def(

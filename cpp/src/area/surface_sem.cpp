@@ -12,11 +12,10 @@ namespace {
 constexpr double kRoughly = 1e-3;  // residual that does for a step of the fixed point
 
 // The constant is free: row and column of vertex 0 become the identity.
-SparseMatrix pinned(SparseMatrix matrix) {
+void pin(SparseMatrix& matrix) {
   for (Index i = 0; i < matrix.outerSize(); ++i)
     for (SparseMatrix::InnerIterator it(matrix, i); it; ++it)
       if (i == 0 || it.col() == 0) it.valueRef() = i == it.col() ? 1.0 : 0.0;
-  return matrix;
 }
 
 // Minimum on (0, longest] of a quartic with coefficients c[0..4] that descends at 0.
@@ -43,9 +42,10 @@ SurfaceSem::SurfaceSem(SurfaceChart chart, const VecRef& areas, double aspect, P
       pattern_(chart_.faces, chart_.n_vertices, 1) {}
 
 SemStep SurfaceSem::step() {
-  SparseMatrix matrix = pinned(chart_stretch_laplacian(pattern_, chart_, areas_, periods_, turns_));
+  SparseMatrix matrix = chart_stretch_laplacian(pattern_, chart_, areas_, periods_, turns_);
+  pin(matrix);
   if (solver_) {
-    solver_->matrix() = std::move(matrix);
+    solver_->matrix().swap(matrix);
     solver_->refactor();
   } else {
     solver_.emplace(std::move(matrix));

@@ -56,7 +56,7 @@ Rows solved(const SparseMatrix& A, const Rows& b) {
     linalg::SolveOptions options;
     options.tol = kTol;
     Rows x = Rows::Zero(b.rows(), b.cols());
-    SpdSolver(A, {"multigrid"}).solve(b, x, options);
+    SpdSolver(SparseMatrix(A), {"multigrid"}).solve(b, x, options);
     return x;
   } catch (const Error&) {
     return solved_directly(A, b);

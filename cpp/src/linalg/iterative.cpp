@@ -94,9 +94,9 @@ PcgResult<K> IterativeSolver<B, M>::solve(const double* b, double* x, Index stri
   std::array<double, K> factor;
   factor.fill(1.0);
   for (int k = 0; k < used; ++k) {
-    double largest = 0.0;
-    for (size_t row = 0; row < n * B; ++row)
-      largest = std::max(largest, std::abs(b[static_cast<size_t>(stride) * row + k]));
+    const double largest = -least_of(matrix_.n * B, 0.0, [&](Index row) {
+      return -std::abs(b[static_cast<size_t>(stride) * row + k]);
+    });
     if (largest > 0.0 && std::isfinite(largest)) factor[k] = std::ldexp(1.0, -std::ilogb(largest));
   }
   inner_b_.resize(n * B * K);

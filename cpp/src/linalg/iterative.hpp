@@ -49,9 +49,9 @@ class IterativeSolver {
   bool ready_ = false;
   bool kept_ =
       false;  // the hierarchy belongs to earlier values: how it does says nothing of its age
-  bool stiff_ = false;                     // a solve drifted without products
-  std::vector<double> inner_b_, inner_x_;  // kept, like the vectors, for the next solve
-  std::vector<float> renumbered_r_, renumbered_z_;
+  bool stiff_ = false;                // a solve drifted without products
+  Buffer<double> inner_b_, inner_x_;  // kept, like the vectors, for the next solve
+  Buffer<float> renumbered_r_, renumbered_z_;
   PcgVectors vectors_;
 };
 

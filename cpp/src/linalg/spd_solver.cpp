@@ -1,6 +1,8 @@
 #include "stretchmap/linalg/spd_solver.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -9,6 +11,7 @@
 #include "linalg/iterative.hpp"
 #include "linalg/ordering.hpp"
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/linalg/block_ldlt.hpp"
 
 namespace stretchmap::linalg {
@@ -31,11 +34,16 @@ std::string choose_backend(const SparseMatrix& A) {
 }
 
 void require_positive_diagonal(const SparseMatrix& A) {
-  const Vec diagonal = A.diagonal();
+  const Index n = static_cast<Index>(A.rows());
+  const auto positive = [&](Index i) {
+    const double value = A.coeff(i, i);
+    return value > 0.0 && std::isfinite(value);
+  };
+  if (least_of(n, 1.0, [&](Index i) { return positive(i) ? 1.0 : 0.0; }) > 0.0) return;
   std::vector<Index> bad;
-  for (Index i = 0; i < A.rows(); ++i)
-    if (!(diagonal[i] > 0.0 && std::isfinite(diagonal[i])) && bad.size() < 20) bad.push_back(i);
-  if (!bad.empty()) refuse_rows(bad);
+  for (Index i = 0; i < n && bad.size() < 20; ++i)
+    if (!positive(i)) bad.push_back(i);
+  refuse_rows(bad);
 }
 
 void factorize_positive(BlockLdlt<1>& factor, const SparseMatrix& A) {
@@ -45,22 +53,37 @@ void factorize_positive(BlockLdlt<1>& factor, const SparseMatrix& A) {
     throw Error("SolverError", "the matrix is not positive definite: a pivot is negative", bad);
 }
 
-// x'(A y) = y'(A x) for two fixed vectors of scattered signs.
+// Of one of the numbers that a fixed vector is made of: scattered over [0, 1).
+double scattered(Index i) {
+  std::uint32_t bits = (static_cast<std::uint32_t>(i) + 1u) * 0x9E3779B9u;
+  bits = (bits ^ (bits >> 16)) * 0x85EBCA6Bu;
+  bits = (bits ^ (bits >> 13)) * 0xC2B2AE35u;
+  return static_cast<double>((bits ^ (bits >> 16)) >> 8) / (1u << 24);
+}
+
+// x'(A y) = y'(A x) for two fixed vectors, the second of scattered signs.
 void require_symmetric(const SparseMatrix& A) {
   if (A.rows() != A.cols() || !A.isCompressed())
     throw Error("SolverError", "the matrix must be square and compressed");
   const Index n = static_cast<Index>(A.rows());
   Vec x(n), y(n);
-  std::uint32_t state = 12345;
-  for (Index i = 0; i < n; ++i) {
-    state = state * 1664525u + 1013904223u;
-    x[i] = 0.5 + static_cast<double>(state >> 8) / (1u << 24);
-    state = state * 1664525u + 1013904223u;
-    y[i] = static_cast<double>(state >> 8) / (1u << 24) - 0.5;
-  }
-  const Vec Ax = A * x, Ay = A * y;
-  const double left = y.dot(Ax), right = x.dot(Ay);
-  const double scale = y.cwiseAbs().dot(Ax.cwiseAbs()) + x.cwiseAbs().dot(Ay.cwiseAbs());
+  for_rows(n, [&](Index i) {
+    x[i] = 0.5 + scattered(2 * i);
+    y[i] = scattered(2 * i + 1) - 0.5;
+  });
+  const auto [left, right, scale] =
+      sum_chunks<3>(n, [&](Index begin, Index end, std::array<double, 3>& sums) {
+        for (Index i = begin; i < end; ++i) {
+          double Ax = 0.0, Ay = 0.0;
+          for (SparseMatrix::InnerIterator entry(A, i); entry; ++entry) {
+            Ax += entry.value() * x[entry.col()];
+            Ay += entry.value() * y[entry.col()];
+          }
+          sums[0] += y[i] * Ax;
+          sums[1] += x[i] * Ay;
+          sums[2] += std::abs(y[i] * Ax) + std::abs(x[i] * Ay);
+        }
+      });
   if (!std::isfinite(left + right + scale))
     throw Error("SolverError", "the matrix has an entry that is not finite");
   if (std::abs(left - right) > 1e-9 * scale)
@@ -83,10 +106,10 @@ struct SpdSolver::State {
   void substitute(const double* b, double* x) const;
 };
 
-SpdSolver::SpdSolver(SparseMatrix A, const SpdOptions& options)
+SpdSolver::SpdSolver(SparseMatrix&& A, const SpdOptions& options)
     : state_(std::make_unique<State>()) {
   require_symmetric(A);
-  state_->A = std::move(A);
+  state_->A.swap(A);
   state_->backend = options.backend == "auto" ? choose_backend(state_->A) : options.backend;
   const std::string& backend = state_->backend;
   if (backend != "direct" && backend != "multigrid" && backend != "jacobi" && backend != "cholmod")

@@ -32,11 +32,11 @@ void orientation(const PointsRef& points, const TetsRef& tets, const FacetGroups
     turn = tets_to_turn(points, tets, patches);
     report.conflicts = as_vector(patches.conflicts);
   }
-  for (Index t = 0; t < tets.rows(); ++t) {
-    if (skip[t]) continue;
+  for_rows(static_cast<Index>(tets.rows()), [&](Index t) {
+    if (skip[t]) return;
     no_volume[t] = flat[t];
     folded[t] = !flat[t] && (turn[t] ? volumes[t] > 0 : volumes[t] < 0);
-  }
+  });
   report.degenerate = set_entries(no_volume);
   report.inverted = set_entries(folded);
   report.misoriented = set_entries(turn);
@@ -190,12 +190,13 @@ void topology(const TetsRef& tets, const std::vector<Index>& next, const IndexVe
     ends[parts.vertex[i]] += degree[i];
   }
   report.euler -= ends / 2;
-  for (Index t = 0; t < tets.rows(); ++t) {
-    if (parts.element[t] < 0) continue;
-    Index faces = 0;
-    for (Index h = 4 * t; h < 4 * t + 4; ++h) faces += next[h] <= h;
-    report.euler[parts.element[t]] += faces - 1;
-  }
+  IndexVec faces(tets.rows());  // each at the first of its tets
+  for_rows(static_cast<Index>(tets.rows()), [&](Index t) {
+    faces[t] = 0;
+    for (Index h = 4 * t; h < 4 * t + 4; ++h) faces[t] += next[h] <= h;
+  });
+  for (Index t = 0; t < tets.rows(); ++t)
+    if (parts.element[t] >= 0) report.euler[parts.element[t]] += faces[t] - 1;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/mesh/disjoint_sets.hpp"
 #include "stretchmap/mesh/facets.hpp"
 #include "stretchmap/mesh/orient.hpp"
@@ -13,20 +14,20 @@ namespace stretchmap::mesh {
 template <class Elements>
 Mask repeating(const Elements& elements) {
   Mask mask(elements.rows(), 0);
-  for (Index e = 0; e < elements.rows(); ++e) {
+  for_rows(static_cast<Index>(elements.rows()), [&](Index e) {
     for (Index i = 0; i < elements.cols(); ++i) {
       for (Index j = 0; j < i; ++j) mask[e] |= elements(e, i) == elements(e, j);
     }
-  }
+  });
   return mask;
 }
 
 // All but the first member of each group.
 inline Mask later_members(const FacetGroups& groups, Index n) {
   Mask mask(n, 0);
-  for (Index g = 0; g < groups.size(); ++g) {
+  for_rows(groups.size(), [&](Index g) {
     for (Index p = groups.start[g] + 1; p < groups.start[g + 1]; ++p) mask[groups.order[p]] = 1;
-  }
+  });
   return mask;
 }
 
@@ -41,10 +42,10 @@ LeftOut left_out(const Elements& elements, const FacetGroups& equal) {
   out.repeated = repeating(elements);
   out.copies = later_members(equal, static_cast<Index>(elements.rows()));
   out.either = out.repeated;
-  for (std::size_t e = 0; e < out.either.size(); ++e) {
+  for_rows(static_cast<Index>(elements.rows()), [&](Index e) {
     if (out.repeated[e]) out.copies[e] = 0;
     out.either[e] |= out.copies[e];
-  }
+  });
   return out;
 }
 

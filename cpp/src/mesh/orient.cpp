@@ -150,9 +150,8 @@ IndexVec misoriented_tets(const PointsRef& points, const TetsRef& tets) {
 IndexVec set_entries(const Mask& mask) {
   IndexVec entries(std::count_if(mask.begin(), mask.end(), [](char m) { return m != 0; }));
   Index k = 0;
-  for (std::size_t e = 0; e < mask.size(); ++e) {
+  for (std::size_t e = 0; k < entries.size(); ++e)
     if (mask[e]) entries[k++] = static_cast<Index>(e);
-  }
   return entries;
 }
 

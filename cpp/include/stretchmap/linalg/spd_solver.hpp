@@ -22,7 +22,7 @@ struct SpdOptions {
 // Owns the matrix. A new set of values is written into matrix().valuePtr() and announced by
 // refactor():
 //
-//   SpdSolver solver(A);                       // analysis and first factorization
+//   SpdSolver solver(std::move(A));            // analysis and first factorization
 //   solver.solve(B, X);                        // X (n, k): warm start in, solution out
 //   fill_values(solver.matrix().valuePtr());   // same pattern
 //   solver.refactor();                         // numerical work only
@@ -33,7 +33,8 @@ class SpdSolver {
   // \pre A square, compressed, structurally symmetric, both triangles stored, diagonal present.
   // \throws OptionError (unknown backend), MissingDependencyError (no CHOLMOD), SolverError (not
   //         symmetric, not positive definite, not finite; ids are rows where a culprit is known).
-  explicit SpdSolver(SparseMatrix A, const SpdOptions& options = {});
+  // A is emptied: Eigen 3 copies sparse matrices where others are moved.
+  explicit SpdSolver(SparseMatrix&& A, const SpdOptions& options = {});
   ~SpdSolver();
   SpdSolver(SpdSolver&&) noexcept;
   SpdSolver& operator=(SpdSolver&&) noexcept;

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap::mesh {
@@ -22,6 +23,12 @@ class DisjointSets {
     b = find(b);
     if (b < a) std::swap(a, b);
     parent_[b] = a;
+  }
+  // (n) what find says of each: parents are lower, and so have their roots by then.
+  std::vector<Index> roots() const {
+    std::vector<Index> root = parent_;
+    for (Index& parent : root) parent = root[parent];
+    return root;
   }
 
  private:
@@ -42,17 +49,21 @@ Components components(const Elements& elements, Index n_vertices, const std::vec
     if (!skip.empty() && skip[e]) continue;
     for (Index k = 1; k < elements.cols(); ++k) sets.unite(elements(e, 0), elements(e, k));
   }
+  const std::vector<Index> root = sets.roots();
+  const Index m = static_cast<Index>(elements.rows());
   Components result;
-  IndexVec number = IndexVec::Constant(n_vertices, -1);
-  result.element.setConstant(elements.rows(), -1);
-  result.vertex.setConstant(n_vertices, -1);
-  for (Index e = 0; e < elements.rows(); ++e) {
-    if (!skip.empty() && skip[e]) continue;
-    Index& component = number[sets.find(elements(e, 0))];
-    if (component < 0) component = result.count++;
-    result.element[e] = component;
-    for (Index k = 0; k < elements.cols(); ++k) result.vertex[elements(e, k)] = component;
+  result.element.resize(m);
+  for_rows(m, [&](Index e) {
+    result.element[e] = !skip.empty() && skip[e] ? -1 : root[elements(e, 0)];
+  });
+  IndexVec number = IndexVec::Constant(n_vertices, -1);  // of each root
+  for (Index& component : result.element) {
+    if (component < 0) continue;
+    if (number[component] < 0) number[component] = result.count++;
+    component = number[component];
   }
+  result.vertex.resize(n_vertices);
+  for_rows(n_vertices, [&](Index i) { result.vertex[i] = number[root[i]]; });
   return result;
 }
 

@@ -24,6 +24,13 @@ Scalars<K> dots(Index n, const double* a, const Real* b) {
   });
 }
 
+template <int K>
+void set_zero(Index n, double* to) {
+  for_chunks(n, [&](Index begin, Index end) {
+    std::fill(to + std::size_t(K) * begin, to + std::size_t(K) * end, 0.0);
+  });
+}
+
 // r = b - q, in both precisions; returns |r|^2.
 template <int K>
 Scalars<K> residual_from(Index n, const double* b, const double* q, double* r, float* r_f) {
@@ -92,8 +99,8 @@ struct Run {
   const PcgSystem<K>& system;
   const double* b;
   double* x;
-  std::vector<double>&r, &p, &q;
-  std::vector<float>&r_f, &z;
+  Buffer<double>&r, &p, &q;
+  Buffer<float>&r_f, &z;
   double energy_share;
   Scalars<K> goal{};  // squared residual aimed at
   Scalars<K> rr{};
@@ -123,7 +130,7 @@ struct Run {
     if (std::any_of(x, x + static_cast<std::size_t>(K) * system.n,
                     [](double v) { return v != 0.0; }))
       return true_residual();
-    std::fill(q.begin(), q.end(), 0.0);
+    set_zero<K>(system.n, q.data());
     rr = residual_from<K>(system.n, b, q.data(), r.data(), r_f.data());
     result.finite = result.finite && all_finite<K>(rr);
   }
@@ -208,9 +215,9 @@ PcgResult<K> pcg(const PcgSystem<K>& system, const double* b, double* x, PcgVect
   const Scalars<K> bb = dots<K>(n, b, b);
   Run<K> run{system,    b,           x,         vectors.r,           vectors.p,
              vectors.q, vectors.r_f, vectors.z, options.energy_share};
-  run.p.assign(size, 0.0);
-  for (std::vector<double>* vector : {&run.r, &run.q}) vector->resize(size);
-  for (std::vector<float>* vector : {&run.r_f, &run.z}) vector->resize(size);
+  for (Buffer<double>* vector : {&run.r, &run.p, &run.q}) vector->resize(size);
+  for (Buffer<float>* vector : {&run.r_f, &run.z}) vector->resize(size);
+  set_zero<K>(n, run.p.data());
   if (!(run.result.finite = all_finite<K>(bb))) return run.result;
   run.begin(bb, options.tol);
   // The recursive residual drifts from the true one; a restart from the true one closes the gap.

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "stretchmap/base/buffer.hpp"
 #include "stretchmap/linalg/solve.hpp"
 
 namespace stretchmap::linalg {
@@ -34,8 +35,8 @@ struct PcgResult {
 
 // Vectors of one run, kept by the caller so that the next one finds its memory in place.
 struct PcgVectors {
-  std::vector<double> r, p, q;
-  std::vector<float> r_f, z;
+  Buffer<double> r, p, q;
+  Buffer<float> r_f, z;
 };
 
 // x: warm start in, solution out. A column with b = 0 gives x = 0 and residual 0.
