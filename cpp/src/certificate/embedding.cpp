@@ -117,7 +117,21 @@ class BoxTree {
 
   explicit BoxTree(std::vector<Box> boxes) : boxes_(std::move(boxes)), order_(boxes_.size()) {
     std::iota(order_.begin(), order_.end(), 0);
-    build(0, 0, static_cast<Index>(order_.size()));
+    const auto n = static_cast<Index>(order_.size());
+    int depth = 0;
+    while (chunk_count(n, Index{1} << depth) > kLeaf) ++depth;
+    nodes_.resize((std::size_t{2} << depth) - 1);
+    std::vector<Piece> pieces{{0, 0, n}};
+    for (int level = 0; level < std::min(depth, kShared); ++level) {
+      std::vector<Piece> halves(2 * pieces.size());
+      for_tasks(static_cast<Index>(pieces.size()), [&](Index k) {
+        const auto [low, high] = halves_of(pieces[k]);
+        halves[2 * k] = low;
+        halves[2 * k + 1] = high;
+      });
+      pieces = std::move(halves);
+    }
+    for_tasks(static_cast<Index>(pieces.size()), [&](Index k) { build(pieces[k]); });
   }
 
   // Appends every element above `id` whose box meets that of `id`.
@@ -127,13 +141,21 @@ class BoxTree {
 
  private:
   static constexpr Index kLeaf = 4;
+  static constexpr int kShared = 4;  // levels whose nodes are worth a thread each
 
-  void build(std::size_t node, Index begin, Index end) {
-    if (nodes_.size() <= node) nodes_.resize(node + 1);
+  struct Piece {
+    std::size_t node = 0;
+    Index begin = 0, end = 0;
+  };
+
+  // Empty ones of a leaf.
+  std::pair<Piece, Piece> halves_of(const Piece& piece) {
+    const auto [node, begin, end] = piece;
+    if (begin == end) return {};
     Box all;
     for (Index i = begin; i < end; ++i) all.extend(boxes_[order_[i]]);
     nodes_[node] = all;
-    if (end - begin <= kLeaf) return;
+    if (end - begin <= kLeaf) return {};
     int axis = 0;
     all.sizes().maxCoeff(&axis);
     const Index middle = begin + (end - begin) / 2;
@@ -142,8 +164,14 @@ class BoxTree {
                        const double x = boxes_[a].center()[axis], y = boxes_[b].center()[axis];
                        return x != y ? x < y : a < b;
                      });
-    build(2 * node + 1, begin, middle);
-    build(2 * node + 2, middle, end);
+    return {{2 * node + 1, begin, middle}, {2 * node + 2, middle, end}};
+  }
+
+  void build(const Piece& piece) {
+    const auto [low, high] = halves_of(piece);
+    if (low.begin == low.end) return;
+    build(low);
+    build(high);
   }
 
   void visit(std::size_t node, Index begin, Index end, Index id, std::vector<Index>& found) const {

@@ -90,7 +90,13 @@ void TetLaplacian::copy_rows(const PointsRef& x, SparseMatrix& matrix, Points& r
 }
 
 double tet_stretch_energy(const VecRef& image_volumes, const VecRef& rest_volumes) {
-  return 1.5 * (image_volumes.array().square() / rest_volumes.array()).sum();
+  return 1.5 * sum_chunks<1>(static_cast<Index>(rest_volumes.size()),
+                             [&](Index begin, Index end, std::array<double, 1>& sum) {
+                               const Index size = end - begin;
+                               sum[0] += (image_volumes.segment(begin, size).array().square() /
+                                          rest_volumes.segment(begin, size).array())
+                                             .sum();
+                             })[0];
 }
 
 Points tet_stretch_gradient(const PointsRef& image, const TetsRef& tets,

@@ -5,17 +5,35 @@
 #include <numeric>
 #include <utility>
 
+#include "stretchmap/base/parallel.hpp"
+
 namespace stretchmap::linalg {
 
 namespace {
 
 constexpr Index kLeaf = 32;       // pieces up to this size are not divided
 constexpr double kSmaller = 0.3;  // share of a piece that either half has, where one can cut so
+constexpr Index kAlone = 1024;    // pieces of so many vertices at least are worth a thread,
+constexpr Index kShares = 8;      // and so are those of this share of all
 
 class Dissector {
  public:
-  Dissector(Index n, const Index* start, const Index* col)
-      : start_(start), col_(col), items_(n), piece_(n, 0), near_(n), far_(n), mark_(n, -1) {
+  // A piece whose subtree is left to others: a node that stands for it, and its vertices.
+  struct Left {
+    Index node;
+    std::vector<Index> vertices;
+  };
+
+  // Pieces of at most `leave` vertices are left.
+  Dissector(Index n, const Index* start, const Index* col, Index leave)
+      : start_(start),
+        col_(col),
+        leave_(leave),
+        items_(n),
+        piece_(n, 0),
+        near_(n),
+        far_(n),
+        mark_(n, -1) {
     std::iota(items_.begin(), items_.end(), 0);
     result_.order.reserve(n);
   }
@@ -24,13 +42,18 @@ class Dissector {
     divide(0, static_cast<Index>(items_.size()));
     return std::move(result_);
   }
+  const std::vector<Left>& left() const { return left_; }
 
  private:
   // The piece items_[first .. last) becomes a subtree; \return its root.
   Index divide(Index first, Index last) {
     Dissection::Node node;
     Index own = first;  // the separator goes to items_[first .. own)
-    if (last - first > kLeaf) {
+    if (last - first <= leave_) {
+      own = last;
+      left_.push_back({static_cast<Index>(result_.nodes.size()),
+                       {items_.begin() + first, items_.begin() + last}});
+    } else if (last - first > kLeaf) {
       const Index label = ++labels_;
       for (Index i = first; i < last; ++i) piece_[items_[i]] = label;
       Index middle = first;
@@ -170,15 +193,79 @@ class Dissector {
 
   const Index* start_;
   const Index* col_;
+  Index leave_;
+  std::vector<Left> left_;
   std::vector<Index> items_, piece_, near_, far_, mark_, queue_;
   Index labels_ = 0, searches_ = -1;
   Dissection result_;
 };
 
+// One piece by itself, its vertices numbered in its order. place[v] is that number, piece[v] whose
+// it is.
+Dissection dissect_piece(const std::vector<Index>& vertices, Index own, const Buffer<Index>& piece,
+                         const Buffer<Index>& place, const Index* start, const Index* col) {
+  std::vector<Index> inner_start{0}, inner;
+  inner_start.reserve(vertices.size() + 1);
+  for (const Index v : vertices) {
+    for (Index e = start[v]; e < start[v + 1]; ++e)
+      if (piece[col[e]] == own) inner.push_back(place[col[e]]);
+    inner_start.push_back(static_cast<Index>(inner.size()));
+  }
+  const auto n = static_cast<Index>(vertices.size());
+  Dissection found = Dissector(n, inner_start.data(), inner.data(), 0).run();
+  for (Index& v : found.order) v = vertices[v];
+  return found;
+}
+
+// The subtrees in place of the nodes that stand for them.
+Dissection grafted(const Dissection& top, const std::vector<Dissector::Left>& left,
+                   std::vector<Dissection>& subtrees) {
+  Dissection all;
+  all.order = top.order;
+  std::vector<Index> now;  // of each node of the top
+  std::size_t k = 0;
+  for (Index i = 0; i < static_cast<Index>(top.nodes.size()); ++i) {
+    Dissection::Node node = top.nodes[i];
+    if (k < left.size() && left[k].node == i) {
+      const Dissection& subtree = subtrees[k++];
+      std::copy(subtree.order.begin(), subtree.order.end(), all.order.begin() + node.first);
+      const auto before = static_cast<Index>(all.nodes.size());
+      for (Dissection::Node inner : subtree.nodes) {
+        inner.first += node.first;
+        inner.last += node.first;
+        for (Index& child : inner.children) child += before;
+        all.nodes.push_back(std::move(inner));
+      }
+    } else {
+      for (Index& child : node.children) child = now[child];
+      all.nodes.push_back(std::move(node));
+    }
+    now.push_back(static_cast<Index>(all.nodes.size()) - 1);
+  }
+  return all;
+}
+
 }  // namespace
 
 Dissection dissect(Index n, const Index* start, const Index* col) {
-  return Dissector(n, start, col).run();
+  Dissector dissector(n, start, col, n > 2 * kAlone ? std::max(kAlone, n / kShares) : 0);
+  const Dissection top = dissector.run();
+  const std::vector<Dissector::Left>& left = dissector.left();
+  if (left.empty()) return top;
+  Buffer<Index> piece(n), place(n);
+  for_rows(n, [&](Index v) { piece[v] = -1; });
+  const auto count = static_cast<Index>(left.size());
+  for_tasks(count, [&](Index k) {
+    for (std::size_t i = 0; i < left[k].vertices.size(); ++i) {
+      piece[left[k].vertices[i]] = k;
+      place[left[k].vertices[i]] = static_cast<Index>(i);
+    }
+  });
+  std::vector<Dissection> subtrees(left.size());
+  for_tasks(count, [&](Index k) {
+    subtrees[k] = dissect_piece(left[k].vertices, k, piece, place, start, col);
+  });
+  return grafted(top, left, subtrees);
 }
 
 }  // namespace stretchmap::linalg
