@@ -267,17 +267,16 @@ class History:
         if stage != self._stage:
             self._stage, self._clock = stage, time.perf_counter()
         volumes = _core.mesh.tet_volumes(x, model.T)
-        shares = volumes / volumes.sum()
-        rings = _core.measures.ring_sums(model.T, shares, len(model.V))
+        spread = _core.measures.share_deviations(model.T, model.shares, model.rings, volumes)
         record = IterationRecord(
             stage=stage,
             iteration=iteration,
             energy=energy,
             step=step,
             residual=residual,
-            flips=int(np.count_nonzero(~(volumes > 0.0))),
-            ring_std=float((rings / model.rings).std()),
-            element_std=float((shares / model.shares).std()),
+            flips=len(volumes) - int(np.count_nonzero(volumes > 0.0)),
+            ring_std=spread.rings,
+            element_std=spread.elements,
             seconds=time.perf_counter() - self._clock,
         )
         self.records.append(record)
