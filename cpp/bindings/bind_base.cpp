@@ -1,5 +1,5 @@
 #include "arrays.hpp"
-#include "stretchmap/base/free_memory.hpp"
+#include "stretchmap/base/memory.hpp"
 #include "stretchmap/base/threads.hpp"
 
 namespace stretchmap::base {

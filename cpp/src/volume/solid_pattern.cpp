@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "stretchmap/base/incidence.hpp"
+#include "stretchmap/base/memory.hpp"
 #include "stretchmap/linalg/pattern.hpp"
 #include "stretchmap/volume/solid_energy.hpp"
 
@@ -50,6 +51,7 @@ SolidEnergy::SolidEnergy(const SolidElements& elements, const PointsRef& x,
   order_ = Eigen::Map<const IndexVec>(by_row.of(0, rows() + 1).begin(), k);
   tets_.resize(k, 4);
   rest_.resize(k, 9);
+  prefer_large_pages(rest_.data(), sizeof(double) * rest_.size());
   weights_.resize(k);
   for_rows(k, [&](Index t) {
     tets_.row(t) = tets.row(order_[t]);
@@ -154,6 +156,7 @@ linalg::BlockMatrix SolidEnergy::pattern() {
   find_face_slots(matrix.col);
   part_rows();
   matrix.values.resize(9 * matrix.col.size());
+  prefer_large_pages(matrix.values.data(), sizeof(double) * matrix.values.size());
   return matrix;
 }
 

@@ -1,13 +1,16 @@
 // Large arrays that threads fill.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <utility>
 #include <vector>
 
+#include "stretchmap/base/memory.hpp"
+
 namespace stretchmap {
 
-// Leaves numbers unset that are given no value.
+// Leaves numbers unset that are given no value, and asks for large pages.
 template <class T>
 struct UnsetAllocator : std::allocator<T> {
   template <class U>
@@ -15,6 +18,11 @@ struct UnsetAllocator : std::allocator<T> {
     using other = UnsetAllocator<U>;
   };
 
+  T* allocate(std::size_t n) {
+    T* const begin = std::allocator<T>::allocate(n);
+    prefer_large_pages(begin, n * sizeof(T));
+    return begin;
+  }
   template <class U>
   void construct(U* at) noexcept {
     ::new (static_cast<void*>(at)) U;
