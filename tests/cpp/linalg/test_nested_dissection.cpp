@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "linalg/direct/nested_dissection.hpp"
@@ -49,23 +50,33 @@ Index begin_of(const linalg::Dissection& found, Index node) {
 }  // namespace
 
 TEST_CASE("no edge joins the two sides of a separator") {
-  Graph graph(30 * 40);
-  graph.add_grid(0, 30, 40);
-  const linalg::Dissection found = graph.dissected();
-  std::vector<Index> place(graph.rows.size());
-  for (std::size_t k = 0; k < found.order.size(); ++k) place[found.order[k]] = Index(k);
-  CHECK(found.order.size() == graph.rows.size());
-  int separated = 0;
-  for (std::size_t n = 0; n < found.nodes.size(); ++n) {
-    const std::vector<Index>& children = found.nodes[n].children;
-    if (children.size() < 2) continue;
-    ++separated;
-    const Index first = begin_of(found, children[0]), middle = begin_of(found, children[1]);
-    for (Index k = first; k < middle; ++k)
-      for (const Index w : graph.rows[found.order[k]])
-        CHECK_FALSE((place[w] >= middle && place[w] < found.nodes[n].first));
+  // Pieces of the second are dissected by themselves.
+  for (const auto& [height, width] : {std::pair<Index, Index>{30, 40}, {90, 70}}) {
+    Graph graph(height * width);
+    graph.add_grid(0, height, width);
+    const linalg::Dissection found = graph.dissected();
+    REQUIRE(found.order.size() == graph.rows.size());
+    std::vector<Index> place(graph.rows.size(), -1);
+    for (std::size_t k = 0; k < found.order.size(); ++k) place[found.order[k]] = Index(k);
+    CHECK(std::count(place.begin(), place.end(), -1) == 0);
+    Index all = 0, separated = 0, before = 0;
+    for (std::size_t n = 0; n < found.nodes.size(); ++n) {
+      const linalg::Dissection::Node& node = found.nodes[n];
+      CHECK(node.first == before);  // one after the other, children before their parents
+      before = node.last;
+      all += node.last - node.first;
+      for (const Index child : node.children) CHECK(child < Index(n));
+      if (node.children.size() < 2) continue;
+      ++separated;
+      const Index first = begin_of(found, node.children[0]);
+      const Index middle = begin_of(found, node.children[1]);
+      for (Index k = first; k < middle; ++k)
+        for (const Index w : graph.rows[found.order[k]])
+          CHECK_FALSE((place[w] >= middle && place[w] < node.first));
+    }
+    CHECK(all == height * width);
+    CHECK(separated > 10);
   }
-  CHECK(separated > 10);
 }
 
 TEST_CASE("a graph is cut where it is thin, not in the middle") {
