@@ -92,6 +92,45 @@ TEST_CASE("the gradient of a solid's energy matches differences") {
   }
 }
 
+TEST_CASE("the Hessian is symmetric where a vertex has hundreds of neighbors") {
+  const Index n = 400;  // round an edge: blocks far along its rows have to be searched
+  Points points(n + 2, 3);
+  points.row(0) << 0.0, 0.0, -1.0;
+  points.row(1) << 0.0, 0.0, 1.0;
+  Tets tets(n, 4);
+  for (Index i = 0; i < n; ++i) {
+    const double angle = 2.0 * M_PI * i / n;
+    points.row(i + 2) << std::cos(angle), std::sin(angle), 0.01 * (i % 7);
+    tets.row(i) << 0, i + 2, (i + 1) % n + 2, 1;
+  }
+  const Rows rest = volume::rest_matrices(points, tets, 1e3);
+  const Vec weights = Vec::Ones(n);
+  const Flags motion = Flags::Constant(n + 2, volume::kFree);
+  SolidEnergy energy({tets, rest, weights, motion}, points);
+  Points x = points + 1e-3 * tests::random_points(n + 2, 6), gradient;
+  linalg::BlockMatrix hessian = energy.pattern();
+  energy.model(x, EnergyWeights{1.0, 1.0, 0.0, 0.0}, gradient, &hessian);
+  const auto block = [&](Index row, Index column) {
+    const Index* first = hessian.col.data() + hessian.row_ptr[row];
+    const Index* last = hessian.col.data() + hessian.row_ptr[row + 1];
+    const Index* found = std::lower_bound(first, last, column);
+    REQUIRE((found != last && *found == column));
+    return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+        hessian.values.data() + 9 * (found - hessian.col.data()));
+  };
+  Index longest = 0;
+  for (Index row = 0; row < hessian.rows(); ++row) {
+    longest = std::max(longest, hessian.row_ptr[row + 1] - hessian.row_ptr[row]);
+    for (Index e = hessian.row_ptr[row]; e < hessian.row_ptr[row + 1]; ++e) {
+      const Index column = hessian.col[e];
+      CHECK(block(row, column).norm() > 0.0);
+      CHECK((block(row, column) - block(column, row).transpose()).norm() <=
+            1e-9 * block(row, row).norm());
+    }
+  }
+  CHECK(longest == n + 2);
+}
+
 TEST_CASE("a handful of elements that a whole step harms are named as they were given") {
   const tests::Solid solid = tests::solid_torus(600);
   const Points& x = solid.points;
