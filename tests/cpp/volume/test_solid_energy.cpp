@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "stretchmap/base/torus.hpp"
 #include "stretchmap/mesh/size.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
 #include "stretchmap/volume/rest_shape.hpp"
@@ -99,7 +100,7 @@ TEST_CASE("the Hessian is symmetric where a vertex has hundreds of neighbors") {
   points.row(1) << 0.0, 0.0, 1.0;
   Tets tets(n, 4);
   for (Index i = 0; i < n; ++i) {
-    const double angle = 2.0 * M_PI * i / n;
+    const double angle = kTwoPi * i / n;
     points.row(i + 2) << std::cos(angle), std::sin(angle), 0.01 * (i % 7);
     tets.row(i) << 0, i + 2, (i + 1) % n + 2, 1;
   }

@@ -219,7 +219,7 @@ Dissection dissect_piece(const std::vector<Index>& vertices, Index own, const Bu
 
 // The subtrees in place of the nodes that stand for them.
 Dissection grafted(const Dissection& top, const std::vector<Dissector::Left>& left,
-                   std::vector<Dissection>& subtrees) {
+                   const std::vector<Dissection>& subtrees) {
   Dissection all;
   all.order = top.order;
   std::vector<Index> now;  // of each node of the top
