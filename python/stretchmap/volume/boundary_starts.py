@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import logging
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -23,6 +24,7 @@ from ..conformal.map import conformal_map
 from ..errors import SolverError
 from ..mesh.meshes import TetMesh, TriMesh
 from .anisotropy import unstretching
+from .opposite_sides import opposite_sides
 from .options import VolumeOptions
 
 __all__ = ["boundary_starts"]
@@ -83,7 +85,10 @@ def boundary_starts(
     if unstretch is not None:
         surface = TriMesh(surface.V @ unstretch, surface.F)
     maps = _BoundaryMaps(surface, options, progress)
-    for found in _all_there_are(maps, maps.gliding() if glide else maps.held(), budget):
+    makers = (
+        itertools.chain([lambda: maps.mirrored(solid)], maps.gliding()) if glide else maps.held()
+    )
+    for found in _all_there_are(maps, makers, budget):
         if unstretch is not None:
             reason = f"{found.stop_reason}, a stretch of the surface undone"
             found = dataclasses.replace(
@@ -155,6 +160,14 @@ class _BoundaryMaps:
         yield lambda: self.after(_STEPS)
         yield lambda: self.after(0)
         yield self.gentle_finished
+
+    def mirrored(self, solid: TetMesh) -> AreaMap | None:
+        """Of a thin wall, the one that keeps its sides opposite each other."""
+        if self.phase is not None:
+            return None
+        found = opposite_sides(solid, self.conformal, self.first.ratio)
+        outward = found and self._turned(found)
+        return None if outward is None or self._not_outward(outward) else outward
 
     @property
     def fatter_ratio(self) -> float:
