@@ -30,7 +30,7 @@ _JOINED = 0.3  # of those, at least, are joined to another through the inside
 _MOST_TWISTS, _AS_GOOD = 12, 0.95  # half turns either way; of few vertices others fit by chance
 # Mean of exp(i a), a what a pair is off being mirrored: with less it is no wall all over. Root mean
 # square of the logarithm of what areas are off: with more, neither untangling nor gliding gets far.
-_MIRRORED, _UNEVEN = 0.9, 0.5
+_MIRRORED, _UNEVEN = 0.9, 0.4
 _ANGLES = 1025
 _THIN = 1e-12  # between levels, of a face that lies in one
 
