@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from .. import _core
 from ..errors import LandmarkError, OptionError
+from ..mesh.normals import vertex_normals
 
 if TYPE_CHECKING:
     from .result import Registration
@@ -63,8 +62,8 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     moved = scale * first.V @ rotation + shift
     there, back = cKDTree(second.V), cKDTree(moved)
     _, partner = there.query(moved)
-    normals = _vertex_normals(first.V, first.F) @ rotation
-    agree = np.einsum("ij,ij->i", normals, _vertex_normals(second.V, second.F)[partner])
+    normals = vertex_normals(first.V, first.F) @ rotation
+    agree = np.einsum("ij,ij->i", normals, vertex_normals(second.V, second.F)[partner])
     _, home = back.query(second.V[partner])
     edge = np.linalg.norm(np.diff(moved[first.edges], axis=1), axis=2).mean()
     usable = (agree > _SAME_WAY) & (np.linalg.norm(moved[home] - moved, axis=1) < 2.0 * edge)
@@ -87,10 +86,3 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
         solid.boundary_vertices[chosen],
         target.boundary_vertices[partner[chosen]],
     )
-
-
-def _vertex_normals(V: NDArray[np.float64], F: NDArray[np.int32]) -> NDArray[np.float64]:
-    face = _core.mesh.face_area_vectors(V, F)
-    sums = [np.bincount(F.ravel(), np.repeat(c, 3), minlength=len(V)) for c in face.T]
-    normals = np.stack(sums, axis=1)
-    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))

@@ -1,11 +1,12 @@
 """A map of the boundary of a thin wall on which both sides stay opposite each other.
 
 Where a wall is one layer of tets thick, every tet has corners on both of its sides, and turns over
-where their images are less opposite than they are. Areas made equal on each side by itself drift
-apart. The conformal map does not: such a wall is nearly the double of a surface with two rims (with
-one, if it is twisted by an odd number of half turns), and so the coordinates of both sides are
-those of that surface. All that is done to them here can be done to both sides alike: each becomes a
-function of itself, so that volumes between its levels are right.
+where their images are less opposite than they are; where there are a few, volumes pay for it. Areas
+made equal on each side by itself drift apart. The conformal map does not: the boundary of such a
+wall is nearly the double of a surface with two rims (with one, if it is twisted by an odd number of
+half turns), and so the coordinates of both sides are those of that surface. All that is done to
+them here can be done to both sides alike: each becomes a function of itself, so that volumes
+between its levels are right.
 """
 
 from __future__ import annotations
@@ -15,18 +16,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from .. import _core
 from ..area.result import AreaMap, mapped
 from ..area.route import Made
 from ..base.torus import TWO_PI
 from ..conformal.map import ConformalMap
-from ..mesh.meshes import TetMesh
+from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.normals import vertex_normals
 
 __all__ = ["opposite_sides"]
 
-_AT_BOUNDARY = 0.5  # of the vertices of a thin wall, at least
-_JOINED = 0.3  # of those, at least, are joined to another through the inside
+_SAMPLE = 10_000  # vertices at most
+_TURNING = 0.25  # of the body's diagonal: how far away a normal is that is off by a radian
+# Cosine between the normals of a pair, at most; times the median of their distances; share of the
+# vertices that have a partner, at least.
+_AWAY, _NEAR, _PAIRED = -0.8, 2.0, 0.3
 _MOST_TWISTS, _AS_GOOD = 12, 0.95  # half turns either way; of few vertices others fit by chance
 # Mean of exp(i a), a what a pair is off being mirrored: with less it is no wall all over. Root mean
 # square of the logarithm of what areas are off: with more, neither untangling nor gliding gets far.
@@ -51,7 +57,7 @@ def opposite_sides(solid: TetMesh, conformal: ConformalMap, ratio: float) -> Are
     AreaMap or None
         None where the solid is no such wall, or areas would stay far off. Faces may look inward.
     """
-    pairs = _opposite(solid, conformal.mesh.V)
+    pairs = _opposite(conformal.mesh)
     if pairs is None:
         return None
     mirror = _mirror(conformal, pairs)
@@ -71,27 +77,22 @@ def opposite_sides(solid: TetMesh, conformal: ConformalMap, ratio: float) -> Are
     return mapped(conformal.mesh, conformal.forms, made, None)
 
 
-def _opposite(solid: TetMesh, V: NDArray[np.float64]) -> NDArray[np.int64] | None:
-    """Rows of boundary vertices, each with the nearest it is joined to by an inner edge: (p, 2).
+def _opposite(surface: TriMesh) -> NDArray[np.intp] | None:
+    """Vertices, of a sample, each with the nearest that faces the other way: pairs (p, 2).
 
-    None of a thick solid. Of a regular mesh the longer edges may all lean the same way. `V`: where
-    the boundary vertices are to be.
+    Those at a rim, whose nearest is at another, are left out. None where few have one.
     """
-    rim = solid.boundary_vertices
-    n = len(rim)
-    if n < _AT_BOUNDARY * solid.n_vertices:
-        return None
-    row = np.full(solid.n_vertices, -1, np.int64)
-    row[rim] = np.arange(n)
-    ends = row[_core.mesh.tet_edges(solid.T, solid.n_vertices)]
-    ends = np.sort(ends[(ends >= 0).all(axis=1)], axis=1)
-    along = np.sort(solid.surface.edges, axis=1).astype(np.int64)
-    ends = ends[~np.isin(ends[:, 0] * n + ends[:, 1], along[:, 0] * n + along[:, 1])]
-    ends = np.concatenate([ends, ends[:, ::-1]])
-    lengths = ((V[ends[:, 1]] - V[ends[:, 0]]) ** 2).sum(axis=1)
-    ends = ends[np.lexsort((lengths, ends[:, 0]))]
-    pairs: NDArray[np.int64] = ends[np.unique(ends[:, 0], return_index=True)[1]]
-    return pairs if len(pairs) >= _JOINED * n else None
+    some = np.arange(0, surface.n_vertices, -(-surface.n_vertices // _SAMPLE))
+    normals = vertex_normals(surface.V, surface.F)[some]
+    some, normals = some[np.isfinite(normals[:, 0])], normals[np.isfinite(normals[:, 0])]
+    V = surface.V[some]
+    turning = _TURNING * np.linalg.norm(np.ptp(V, axis=0)) * normals
+    _, nearest = cKDTree(np.hstack([V, turning])).query(np.hstack([V, -turning]))
+    away = (normals * normals[nearest]).sum(axis=1) < _AWAY
+    distances = np.linalg.norm(V[nearest] - V, axis=1)
+    near = distances <= _NEAR * np.median(distances[away]) if away.any() else away
+    pairs: NDArray[np.intp] = np.column_stack([some, some[nearest]])[away & near]
+    return pairs if len(pairs) >= _PAIRED * len(some) else None
 
 
 def _volume_shares(solid: TetMesh) -> NDArray[np.float64]:
@@ -116,7 +117,7 @@ class _Mirror:
     agreement: float
 
 
-def _mirror(conformal: ConformalMap, pairs: NDArray[np.int64]) -> _Mirror:
+def _mirror(conformal: ConformalMap, pairs: NDArray[np.intp]) -> _Mirror:
     """The mirror on which pairs agree best."""
     u, v = conformal.turns[pairs].transpose(2, 1, 0)
     middle = u[0] + 0.5 * _wrapped(u[1] - u[0])

@@ -59,7 +59,7 @@ def off(turns: np.ndarray) -> np.ndarray:
 def test_opposite_vertices_are_mirrored_whatever_the_twist(half_turns):
     solid = ribbon(half_turns)
     conformal = sm.conformal_map(solid.surface)
-    mirror = _mirror(conformal, _opposite(solid, solid.surface.V))
+    mirror = _mirror(conformal, _opposite(solid.surface))
     # A longitude may run round with the rims, a whole turn of them at a time.
     assert mirror.twist % 2 == half_turns % 2 and mirror.agreement > 0.95
     found = opposite_sides(solid, conformal, 2.0)
