@@ -28,11 +28,12 @@ from ..mesh.normals import vertex_normals
 
 __all__ = ["opposite_sides"]
 
-_SAMPLE = 10_000  # vertices at most
+_SAMPLE = 1_000  # vertices at most whose opposite ones are looked for
 _TURNING = 0.25  # of the body's diagonal: how far away a normal is that is off by a radian
 # Cosine between the normals of a pair, at most; times the median of their distances; share of the
 # vertices that have a partner, at least.
 _AWAY, _NEAR, _PAIRED = -0.8, 2.0, 0.3
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _MOST_TWISTS, _AS_GOOD = 12, 0.95  # half turns either way; of few vertices others fit by chance
 # Mean of exp(i a), a what a pair is off being mirrored: with less it is no wall all over. Root mean
 # square of the logarithm of what areas are off: with more, neither untangling nor gliding gets far.
@@ -78,20 +79,22 @@ def opposite_sides(solid: TetMesh, conformal: ConformalMap, ratio: float) -> Are
 
 
 def _opposite(surface: TriMesh) -> NDArray[np.intp] | None:
-    """Vertices, of a sample, each with the nearest that faces the other way: pairs (p, 2).
+    """Some vertices, each with the nearest that faces the other way: pairs (p, 2).
 
     Those at a rim, whose nearest is at another, are left out. None where few have one.
     """
-    some = np.arange(0, surface.n_vertices, -(-surface.n_vertices // _SAMPLE))
-    normals = vertex_normals(surface.V, surface.F)[some]
-    some, normals = some[np.isfinite(normals[:, 0])], normals[np.isfinite(normals[:, 0])]
-    V = surface.V[some]
+    V, normals = surface.V, vertex_normals(surface.V, surface.F)
+    known = np.flatnonzero(np.isfinite(normals[:, 0]))
     turning = _TURNING * np.linalg.norm(np.ptp(V, axis=0)) * normals
-    _, nearest = cKDTree(np.hstack([V, turning])).query(np.hstack([V, -turning]))
-    away = (normals * normals[nearest]).sum(axis=1) < _AWAY
-    distances = np.linalg.norm(V[nearest] - V, axis=1)
+    # Not every so many: of a regular mesh those may all lie at a rim.
+    places = np.arange(1, min(len(known), _SAMPLE) + 1) * _GOLDEN % 1.0
+    some = known[np.unique((places * len(known)).astype(np.intp))]
+    tree = cKDTree(np.hstack([V[known], turning[known]]))
+    nearest = known[tree.query(np.hstack([V[some], -turning[some]]))[1]]
+    away = (normals[some] * normals[nearest]).sum(axis=1) < _AWAY
+    distances = np.linalg.norm(V[nearest] - V[some], axis=1)
     near = distances <= _NEAR * np.median(distances[away]) if away.any() else away
-    pairs: NDArray[np.intp] = np.column_stack([some, some[nearest]])[away & near]
+    pairs: NDArray[np.intp] = np.column_stack([some, nearest])[away & near]
     return pairs if len(pairs) >= _PAIRED * len(some) else None
 
 

@@ -9,6 +9,7 @@ import stretchmap as sm
 from shapes import RING, box, cubes, mug
 from stretchmap.base.torus import TWO_PI
 from stretchmap.volume import boundary_starts as starts_module
+from stretchmap.volume import opposite_sides as module
 from stretchmap.volume.boundary_starts import boundary_starts
 from stretchmap.volume.opposite_sides import (
     _mirror,
@@ -21,19 +22,21 @@ from stretchmap.volume.options import VolumeOptions
 ALONG, ACROSS = 48, 8
 
 
-def ribbon(half_turns: int, *, thick: float = 0.05, wedge: float = 0.0) -> sm.TetMesh:
-    """A flat ring of one layer of cells, twisted; row ``2 (9 i + x) + z`` of its vertices is on
-    side z. Its thickness grows across by ``wedge``."""
-    points, T = cubes(box(ALONG, ACROSS, 1))
+def ribbon(
+    half_turns: int, *, thick: float = 0.05, wedge: float = 0.0, layers: int = 1
+) -> sm.TetMesh:
+    """A flat ring of cells, twisted; row ``(layers + 1) (9 i + x) + z`` of its vertices is at
+    height z. Its thickness grows across by ``wedge``."""
+    points, T = cubes(box(ALONG, ACROSS, layers))
     i, x, z = points.astype(int).T
     last = i == ALONG
     if half_turns % 2:  # which a Kuhn split of the section stays in place under
-        x, z = np.where(last, ACROSS - x, x), np.where(last, 1 - z, z)
-    ids = 2 * ((ACROSS + 1) * (i % ALONG) + x) + z
-    i, x, z = np.indices((ALONG, ACROSS + 1, 2)).reshape(3, -1)
+        x, z = np.where(last, ACROSS - x, x), np.where(last, layers - z, z)
+    ids = (layers + 1) * ((ACROSS + 1) * (i % ALONG) + x) + z
+    i, x, z = np.indices((ALONG, ACROSS + 1, layers + 1)).reshape(3, -1)
     u = TWO_PI * i / ALONG
     across = 0.4 * (2.0 * x / ACROSS - 1.0)
-    up = thick * (1.0 + wedge * across) * (z - 0.5)
+    up = thick * (1.0 + wedge * across) * (z / layers - 0.5)
     cos, sin = np.cos(0.5 * half_turns * u), np.sin(0.5 * half_turns * u)
     away, height = 1.0 + across * cos - up * sin, across * sin + up * cos
     V = np.stack([away * np.cos(u), away * np.sin(u), height], axis=-1)
@@ -74,6 +77,26 @@ def test_opposite_vertices_are_mirrored_whatever_the_twist(half_turns):
     assert sums.max() < (0.1 if half_turns else 1e-9) and np.median(sums) < 0.01
     # Not by being all in one place.
     assert np.median(off(v[near] - v[far])) > 0.1
+
+
+@pytest.mark.parametrize(("layers", "sample"), [(1, 1000), (1, 100), (2, 1000), (2, 100)])
+def test_the_mirror_is_found_from_some_vertices_and_through_any_number_of_layers(
+    monkeypatch, layers, sample
+):
+    monkeypatch.setattr(module, "_SAMPLE", sample)
+    solid = ribbon(0, layers=layers)
+    conformal = sm.conformal_map(solid.surface)
+    pairs = _opposite(solid.surface)
+    assert len(pairs) <= sample
+    mirror = _mirror(conformal, pairs)
+    assert mirror.twist == 0 and mirror.agreement > 0.95
+    # A rim of several layers has a middle, which the mirror leaves in its place.
+    middle = np.flatnonzero(np.abs(solid.surface.V[:, 2]) < 1e-9)
+    on = np.arange(solid.n_vertices) if layers == 1 else middle
+    v = conformal.turns[on, 1] - mirror.axis
+    if layers == 1:
+        v = v.reshape(-1, 2).sum(axis=1)
+    assert np.abs(v - np.round(2.0 * v) / 2.0).max() < 0.01
 
 
 def test_rims_lie_at_the_equators_the_shorter_one_inside():
