@@ -95,7 +95,7 @@ def _opposite(surface: TriMesh) -> NDArray[np.intp] | None:
     distances = np.linalg.norm(V[nearest] - V[some], axis=1)
     near = distances <= _NEAR * np.median(distances[away]) if away.any() else away
     pairs: NDArray[np.intp] = np.column_stack([some, nearest])[away & near]
-    return pairs if len(pairs) >= _PAIRED * len(some) else None
+    return pairs if len(pairs) > _PAIRED * len(some) else None
 
 
 def _volume_shares(solid: TetMesh) -> NDArray[np.float64]:
@@ -189,8 +189,10 @@ def _leveled(mirror: _Mirror, conformal: ConformalMap, shares: NDArray[np.float6
     F, (u, v) = conformal.mesh.F, conformal.turns.T
     around = _around(u, F, shares)
     away = _wrapped(v - mirror.axis - 0.5 * mirror.twist * u)
-    # Between which distances from the axis a face lies, those on both sides taken together.
-    corners, distances = _lifted(away[F]), np.abs(away[F])
+    # Between which distances from the axis a face lies, those on both sides taken together. Where u
+    # begins anew, the other rim may be the nearer one.
+    corners = away[F[:, :1]] + _across(v[F]) - 0.5 * mirror.twist * _across(u[F])
+    distances = np.abs(_wrapped(corners))
     low, high = corners.min(axis=1), corners.max(axis=1)
     low, high = (
         np.where(np.floor(low) != np.floor(high), 0.0, distances.min(axis=1)),
@@ -208,7 +210,7 @@ def _around(
     u: NDArray[np.float64], F: NDArray[np.int32], shares: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Turns with equal shares between them, all round."""
-    corners = _lifted(u[F])
+    corners = u[F[:, :1]] + _across(u[F])
     corners -= np.floor(corners.min(axis=1, keepdims=True))
     low, high = corners.min(axis=1), corners.max(axis=1)
     low, high = np.concatenate([low, low - 1.0]), np.concatenate([high, high - 1.0])
@@ -240,6 +242,6 @@ def _wrapped(turns: NDArray[np.float64]) -> NDArray[np.float64]:
     return turns - np.round(turns)
 
 
-def _lifted(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turns of the corners of faces (m, 3), those next to the first one's."""
-    return corners[:, :1] + _wrapped(corners - corners[:, :1])
+def _across(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turns from the first corners of faces (m, 3) to all of them."""
+    return _wrapped(corners - corners[:, :1])
