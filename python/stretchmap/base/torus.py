@@ -17,6 +17,11 @@ __all__ = ["Torus"]
 TWO_PI = 2.0 * math.pi
 
 
+def wrapped(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The shortest way on a circle or flat torus that ends where so many turns do."""
+    return turns - np.round(turns)
+
+
 @dataclass(frozen=True)
 class Torus:
     """The torus of revolution about the z-axis, and the solid torus it bounds.

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.torus import wrapped
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.split_edges import SplitSolid
-from .flat_torus import FlatSurface, wrapped
+from .flat_torus import FlatSurface
 from .overlay import overlay_splits
 from .surface_problem import SurfaceProblem
 

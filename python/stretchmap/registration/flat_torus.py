@@ -21,11 +21,6 @@ _GRID = 20  # shifts tried along either coordinate
 _SAMPLE = 300  # vertices the rigid fit is judged by
 
 
-def wrapped(way: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The shortest way on the flat torus that ends where ``way`` does."""
-    return way - np.round(way)
-
-
 @dataclass(frozen=True, eq=False)
 class FlatSurface:
     """A genus-one surface with coordinates on the unit flat torus.

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.progress import Progress, report
+from ..base.torus import wrapped
 from ..errors import LandmarkError, SolverError
 from ..maps.history import IterationRecord
-from .flat_torus import FlatSurface, wrapped
+from .flat_torus import FlatSurface
 from .surface_problem import SurfaceProblem
 
 __all__ = ["Match", "match_surfaces"]

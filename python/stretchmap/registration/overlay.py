@@ -12,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.torus import wrapped
 from ..mesh.meshes import TriMesh
-from .flat_torus import FlatSurface, wrapped
+from .flat_torus import FlatSurface
 
 _SAMPLES = 19  # of an edge; the crossings next to them are found
 _EXACT = 1e-9  # of the target's size: no distance

@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from .. import _core
 from ..area.result import AreaMap, mapped
 from ..area.route import Made
-from ..base.torus import TWO_PI
+from ..base.torus import TWO_PI, wrapped
 from ..conformal.map import ConformalMap
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.normals import vertex_normals
@@ -123,7 +123,7 @@ class _Mirror:
 def _mirror(conformal: ConformalMap, pairs: NDArray[np.intp]) -> _Mirror:
     """The mirror on which pairs agree best."""
     u, v = conformal.turns[pairs].transpose(2, 1, 0)
-    middle = u[0] + 0.5 * _wrapped(u[1] - u[0])
+    middle = u[0] + 0.5 * wrapped(u[1] - u[0])
     twists = range(-_MOST_TWISTS, _MOST_TWISTS + 1)
     sums = [v[0] + v[1] - twist * middle for twist in twists]
     means = [complex(np.exp(1j * TWO_PI * at).mean()) for at in sums]
@@ -132,7 +132,7 @@ def _mirror(conformal: ConformalMap, pairs: NDArray[np.intp]) -> _Mirror:
     row = min(fitting, key=lambda row: abs(twists[row]))
     # A mean would be drawn aside by those next to a rim, which have no partner but to one side.
     mean = float(np.angle(means[row])) / TWO_PI
-    twice = mean + float(np.median(_wrapped(sums[row] - mean)))
+    twice = mean + float(np.median(wrapped(sums[row] - mean)))
     return _Mirror(0.5 * twice, twists[row], abs(means[row]))
 
 
@@ -188,11 +188,11 @@ class _Wall:
 def _leveled(mirror: _Mirror, conformal: ConformalMap, shares: NDArray[np.float64]) -> _Wall:
     F, (u, v) = conformal.mesh.F, conformal.turns.T
     around = _around(u, F, shares)
-    away = _wrapped(v - mirror.axis - 0.5 * mirror.twist * u)
+    away = wrapped(v - mirror.axis - 0.5 * mirror.twist * u)
     # Between which distances from the axis a face lies, those on both sides taken together. Where u
     # begins anew, the other rim may be the nearer one.
     corners = away[F[:, :1]] + _across(v[F]) - 0.5 * mirror.twist * _across(u[F])
-    distances = np.abs(_wrapped(corners))
+    distances = np.abs(wrapped(corners))
     low, high = corners.min(axis=1), corners.max(axis=1)
     low, high = (
         np.where(np.floor(low) != np.floor(high), 0.0, distances.min(axis=1)),
@@ -237,11 +237,6 @@ def _below(
     return found
 
 
-def _wrapped(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turns within half a one of zero."""
-    return turns - np.round(turns)
-
-
 def _across(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turns from the first corners of faces (m, 3) to all of them."""
-    return _wrapped(corners - corners[:, :1])
+    return wrapped(corners - corners[:, :1])
