@@ -23,12 +23,12 @@ from ..mesh.halved_faces import SurfaceRefinement, halve_edges
 from ..mesh.surfaces import TriMesh
 from .coarse import Level, forms_of
 from .finish import (
-    MANY_FOLDED,
     Pace,
     Steps,
     approach_areas,
     cut_short,
     finish_areas,
+    many_folded,
     unfold_faces,
     worth_rings,
 )
@@ -40,10 +40,9 @@ _log = logging.getLogger("stretchmap")
 
 _SAG = 1.0  # most sag of an edge, over the heights its faces are to have above it
 _FAR, _MANY = 2.0, 0.005  # more than this share of the edges with more sag than that: too coarse
-# Faces there may be: so many times those of the input, and so many more; up to twice as many times
-# where work is left for so many steps, to begin with and after each approach.
-_GROWTH, _SPARE = 2.5, 12_000
-_MOST_GROWTH, STEPS_LEFT = 5.0, (60, 50, 40, 30)
+# Faces there may be: so many times those of the input, and so many more; still more where work is
+# left for so many steps, to begin with and after each approach.
+_GROWTH, _SPARE, STEPS_LEFT = 2.5, 12_000, (60, 50, 40, 30)
 _BENT = 0.5  # least share of its area that a face may keep when the flat chart is bent
 _PASSES = 14
 _TWINS = 2  # rounds in which the other long edges of needles follow: more cost more than they give
@@ -57,6 +56,7 @@ _ROUNDS = 3
 _LEAST_STEPS = 10  # from where areas are nearly right, however little work is left
 ROUND_STEPS = 20  # of each round; fewer are not worth it
 _UNFOLDING = (0.6, (10, 60))  # a share of the work, and steps, until no face is folded
+_LAST_RESERVE = 0.2  # of what was reserved, until the last few faces are turned
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -281,7 +281,7 @@ class Finer:
             affordable = work.steps(n_faces) - _LEAST_STEPS
             if affordable <= 0:
                 break
-            records, reached = approach_areas(newton, min(most, affordable), progress)
+            records, reached = approach_areas(newton, min(most, affordable), progress, work.late)
             pace = max(pace, reached, key=lambda each: each.weight)
             work.spend_on_approach(len(records), n_faces)
             history += records
@@ -329,7 +329,7 @@ class Finer:
         """Whether so many vertices more make more faces than may be, or than that share of them."""
         n_faces = len(self.added.parent_face)
         given = n_faces * self.share
-        most = min(max(_GROWTH * given + _SPARE, self.affordable), _MOST_GROWTH * given + _SPARE)
+        most = max(_GROWTH * given + _SPARE, self.affordable)
         return n_faces + 2 * more > share * most
 
 
@@ -361,10 +361,10 @@ def mapped_finer(
             return None
         newton, n_faces, reserved = finer.newton(), finer.level.surface.n_faces, work.reserved
         if not turned_outward(newton, n_faces, pace):
-            # On the last few of them, what is reserved is well spent.
-            if not reserved or newton.measures().flips > MANY_FOLDED:
+            # On the last few of them, most of what is reserved is well spent.
+            if not reserved or many_folded(newton.measures().flips, n_faces):
                 return None
-            work.reserved = 0.0
+            work.reserved *= _LAST_RESERVE
             if not turned_outward(newton, n_faces, pace):
                 work.reserved = reserved
                 return None
@@ -378,7 +378,7 @@ def mapped_finer(
         affordable = work.steps(n_faces)
         most = min(int(np.clip(_UNFOLDING[0] * affordable, *_UNFOLDING[1])), affordable)
         work.begin(newton, n_faces)
-        unfolding = unfold_faces(newton, most, progress, pace)
+        unfolding = unfold_faces(newton, most, progress, pace, work.late)
         work.spend(len(unfolding), n_faces)
         history.extend(unfolding)
         return newton.least_facing() > 0.0

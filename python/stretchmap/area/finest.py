@@ -59,7 +59,7 @@ class Finest:
     def found(self, *, refine: bool) -> AreaMap:
         """The map of a surface as fine as there is work for, certified or not."""
         level, finer, coarse = self.equal.level, None, False
-        if refine:
+        if refine and len(self.stack) == 1:
             self.work.reserved = _RESERVED
             coarse, finer = self._finer_at_once()
             self.work.reserved = 0.0

@@ -50,8 +50,8 @@ _JAMMED, _SHORT = 10, 1e-3  # steps in a row, shorter than that, unfold nothing 
 # In so many steps the fewest faces folded so far are to become fewer by that factor: what is mostly
 # folded or folds ever more faces is not unfolded by any number of steps.
 _WINDOW, _FEWER = 10, 0.7
-# In half as many where areas are nearly right, so many are folded and the energy hardly falls.
-MANY_FOLDED, _FALLING = 30, 0.1
+# In half as many where areas are nearly right, many are folded and the energy hardly falls.
+_MANY, _MANY_OF, _FALLING = 30, 5e-4, 0.1
 _EPSILON = 0.2  # of the worst face
 _LEAST_EPSILON, _MOST_EPSILON = 1e-2, 1.0
 
@@ -106,20 +106,21 @@ def unfold_faces(
     steps: int,
     progress: Progress | None,
     pace: Pace | None = None,
+    late: Callable[[], bool] | None = None,
 ) -> list[IterationRecord]:
     """Newton steps on the regularized energy until every face looks outward.
 
     With a pace, areas are nearly right and the area term is as heavy as it says. At most ``steps``,
-    and no more where the number of those that do not hardly falls.
+    and no more where the number of those that do not hardly falls, or once `late` says so.
     """
     start = time.perf_counter()
     history: list[IterationRecord] = []
     weight, push = (1.0, _FACING) if pace is None else (pace.weight, _PUSH)
-    short = 0
+    short, n_faces = 0, 2 * len(newton.angles) if pace else 0
     fewest: list[int] = []
     for iteration in range(steps):
         facing = newton.least_facing()
-        if facing > 0.0:
+        if facing > 0.0 or (late is not None and late()):
             break
         epsilon = min(max(-_EPSILON * facing, _LEAST_EPSILON), _MOST_EPSILON)
         taken = newton.step(_weights(weight, weight * push, _SHAPE, epsilon))
@@ -127,13 +128,18 @@ def unfold_faces(
         report(progress, "area", iteration, steps, flips=history[-1].flips)
         short = short + 1 if taken.step < _SHORT else 0
         fewest.append(min([*fewest[-1:], history[-1].flips]))
-        hasty = pace is not None and fewest[-1] > MANY_FOLDED
+        hasty = pace is not None and many_folded(fewest[-1], n_faces)
         hasty = hasty and taken.before - taken.after < _FALLING * abs(taken.before)
         window = _WINDOW // 2 if hasty else _WINDOW
         slow = len(fewest) > window and fewest[-1] > _FEWER * fewest[-1 - window]
         if taken.step == 0.0 or short == _JAMMED or slow:
             break
     return history
+
+
+def many_folded(folded: int, n_faces: int) -> bool:
+    """Whether so many of so many faces are not the last few."""
+    return folded > max(_MANY, _MANY_OF * n_faces)
 
 
 @dataclass
@@ -163,7 +169,10 @@ class Steps:
 
 
 def approach_areas(
-    newton: _core.area.SurfaceNewton, most: int, progress: Progress | None
+    newton: _core.area.SurfaceNewton,
+    most: int,
+    progress: Progress | None,
+    late: Callable[[], bool] | None = None,
 ) -> tuple[list[IterationRecord], Pace]:
     """Newton steps until areas are nearly right, whichever way faces look meanwhile; their pace.
 
@@ -173,6 +182,8 @@ def approach_areas(
     history: list[IterationRecord] = []
     pace, shape, at_rest = Pace(), _shape_weight(newton), _rest()
     while len(history) < most and newton.measures().face_std > _NEAR:
+        if late is not None and late():
+            break
         taken = newton.step(_weights(pace.weight, 0.0, shape))
         if taken.step >= _FULL_STEP:
             pace.weight = min(pace.weight * _GROWTH, _LIGHT)

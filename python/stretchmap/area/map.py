@@ -52,7 +52,7 @@ def area_map(
     balance: float = 1.0,
     sem_iter: int = 10,
     refine: bool = True,
-    time_limit: float = 2e-3,
+    time_limit: float = 1e-2,
     keep_best: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -105,8 +105,8 @@ def area_map(
         than ``surface``. Not with ``finish="none"`` or a ``balance`` below 1.
     time_limit : float
         Processor seconds per face, of all threads, that may be spent: where they are used up, the
-        steps end. Small surfaces get some seconds. Twice what a tet may take, as a solid has about
-        two and a half tets per face of its surface.
+        steps end. Small surfaces get some seconds. Most take a fiftieth of it; what needs many more
+        faces may have as many more as there is time for.
     keep_best : bool
         Return the map even if it is not certified.
     threads : int, optional
@@ -203,7 +203,6 @@ def _found(
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
     stack = levels(equal.level)
-    refine = refine and len(stack) == 1
     work = Work.of(surface, budget, refine=refine)
     found = Finest(route, stack, equal, torus, work, progress).found(refine=refine)
     if not (work.out_of_time() and cut_short(found.stop_reason)):

@@ -13,8 +13,12 @@ from ..mesh.surfaces import TriMesh
 # In units of what a face adds to a step besides its share of the elimination: so many a face of
 # the surface given, and no fewer than those.
 _EACH, _LEAST = 1200.0, 5e6
+# Where edges may be halved, so many for each second there is, once or twice what a processor gets
+# done; and as many times the faces as those are that many a face.
+_A_SECOND, _A_TIME = 6.7e5, 320.0
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
+_MOST_FACES = 10**6
 _UNREFINED = 40  # steps where edges can be halved after them
 # Steps that others take as long as: one in the flat chart, one without a barrier against faces that
 # look inward, halving edges until few sag, and rings made exact.
@@ -23,11 +27,6 @@ _ONCE = 0.8  # of what a face adds to a step, where its system is solved more th
 _TOLD = 0.02  # of all the time; steps that took as long tell how long others will take
 _KEPT = 0.05  # of it, for the certificate
 _OVER = 0.2  # of it, with which too few steps can be afforded
-
-
-def _whole(n_faces: int) -> float:
-    """Units that a surface of so many faces may take."""
-    return max(_EACH * n_faces, _LEAST)
 
 
 @dataclass
@@ -46,6 +45,8 @@ class Work:
     clock : Budget
     reserved : float
         Share of all that is left for what follows should this lead nowhere.
+    growth : float
+        Most faces there may be, over those of the surface given.
     """
 
     n_faces: int
@@ -53,6 +54,8 @@ class Work:
     most: int
     clock: Budget = field(default_factory=lambda: Budget(math.inf))
     reserved: float = 0.0
+    growth: float = math.inf
+    _whole: float = 0.0  # all there was
     _flops: float = _TYPICAL  # of the surfaces seen last
     _begun: float | None = None
     _newton: _core.area.SurfaceNewton | None = None  # whose steps have begun
@@ -62,9 +65,11 @@ class Work:
 
     @classmethod
     def of(cls, surface: TriMesh, clock: Budget, *, refine: bool) -> Work:
-        """All of it."""
-        left = _whole(surface.n_faces)
-        work = cls(surface.n_faces, left, _UNREFINED, clock)
+        """All of it; of finite time where edges may be halved."""
+        n_faces = surface.n_faces
+        units = _A_SECOND * clock.seconds if refine else _EACH * n_faces
+        growth, left = units / (_A_TIME * n_faces), max(units, _LEAST)
+        work = cls(n_faces, left, _UNREFINED, clock, growth=growth, _whole=left)
         if not refine:
             work.most = work.steps()
         return work
@@ -114,23 +119,26 @@ class Work:
         At least so many, if there is time for them, and at most so many.
         """
         cost = self._cost(n_faces or self.n_faces)
-        left = self.left - self.reserved * _whole(self.n_faces)
+        left = self.left - self.reserved * self._whole
         units = min(max(left, least * cost), most * cost)
         return max(int(min(units, self._in_time()) / cost + 1e-9), 0)
 
     def most_faces(self, steps: int) -> int:
-        """Those of the largest surface on which so many steps, one at least, can be afforded."""
+        """Those of the largest surface on which so many steps, one at least, can be afforded.
+
+        No more than there may be.
+        """
         few, many = 0, 1
         while self.steps(many) >= steps:
             few, many = many, 2 * many
         while many - few > 1:
             middle = (few + many) // 2
             few, many = (middle, many) if self.steps(middle) >= steps else (few, middle)
-        return few
+        return int(min(few, self.growth * self.n_faces, _MOST_FACES))
 
     def late(self) -> bool:
-        """Whether what time is left is for the certificate."""
-        return self.clock.left < _KEPT * self.clock.seconds
+        """Whether what time is left is reserved, or for the certificate."""
+        return self.clock.left < (_KEPT + self.reserved) * self.clock.seconds
 
     def out_of_time(self) -> bool:
         """Whether it is time that has run out, and not units."""

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from small_handles import small_handle, start_of
 from stretchmap import _core
+from stretchmap.area import coarse
 from stretchmap.area.coarse import Level, levels
 
 
@@ -59,3 +61,17 @@ def test_a_large_surface_has_the_quality_of_a_small_one(large):
     assert "coarse" in stages
     assert stages.count("newton") <= 12
     np.testing.assert_array_equal(result.image, results[1].image)
+
+
+@pytest.mark.parametrize(("seed", "far"), [(0, 4.2), (1, 3.6)])
+def test_edges_of_a_large_surface_are_halved_too(monkeypatch, seed: int, far: float) -> None:
+    """A large body may have limbs or a hole of few edges round, as a small one may."""
+    surface = small_handle(seed, far)
+    monkeypatch.setattr(coarse, "_MOST_FACES", surface.n_faces - 1)
+    monkeypatch.setattr(coarse, "_LEAST_FACES", surface.n_faces // 2)
+    stack = levels(start_of(surface).level)
+    assert len(stack) == 2
+    kept, result = (sm.area_map(surface, refine=refine) for refine in (False, True))
+    assert kept.refinement is None and kept.distortion.element_std > 0.02
+    assert result.refinement is not None and result.certificate.certified
+    assert result.distortion.element_std <= 0.01

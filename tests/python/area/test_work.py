@@ -13,7 +13,14 @@ from small_handles import eased, inward_faces, small_handle, start_of
 from stretchmap import _core
 from stretchmap.area import finer
 from stretchmap.area.finer import Finer, mapped_finer
-from stretchmap.area.finish import Pace, Steps, finish_areas
+from stretchmap.area.finish import (
+    Pace,
+    Steps,
+    approach_areas,
+    finish_areas,
+    many_folded,
+    unfold_faces,
+)
 from stretchmap.area.map import equal_areas
 from stretchmap.area.route import Made
 from stretchmap.area.work import Work
@@ -21,7 +28,7 @@ from stretchmap.base.budget import Budget
 
 
 def test_work_is_left_for_the_surface_as_it_is() -> None:
-    work = Work.of(sm.samples.torus_surface(100, 80), Budget(np.inf), refine=True)
+    work = Work.of(sm.samples.torus_surface(100, 80), Budget(30.0), refine=True)
     most = work.steps()
     work.reserved = 0.25
     assert 0.7 * most < work.steps() < 0.8 * most
@@ -41,7 +48,7 @@ def test_steps_end_when_it_is_late() -> None:
     work = Work.of(surface, Budget(10.0), refine=True)
     assert not work.late() and not work.out_of_time()
     work.clock = Budget(0.0)
-    assert Work.of(surface, Budget(np.inf), refine=True).late() is False
+    assert Work.of(surface, Budget(30.0), refine=True).late() is False
     equal = equal_areas(surface, sm.conformal_map(surface), None, Budget(0.0))
     assert len(equal.balanced(0.0)[1]) == 0
 
@@ -53,15 +60,15 @@ def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
     monkeypatch.setattr(Finer, "approached", lambda self, *_: (self, Pace(), []))
     taken = []
 
-    def unfold(newton, steps, progress, pace):
+    def unfold(newton, steps, progress, pace, late):
         taken.append(steps)
         return []
 
     monkeypatch.setattr(finer, "unfold_faces", unfold)
     made = Made(start.angles, 0.0, start.ratio, [])
-    for many, times in ((0, 1), (10**6, 2)):
+    for many, times in ((True, 1), (False, 2)):
         taken.clear()
-        monkeypatch.setattr(finer, "MANY_FOLDED", many)
+        monkeypatch.setattr(finer, "many_folded", lambda *_, many=many: many)
         work = Work(start.level.surface.n_faces, 1e9, 40, reserved=0.25)
         assert mapped_finer(start, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work) is None
         assert len(taken) == times and work.reserved == 0.25
@@ -85,7 +92,7 @@ def test_solves_beyond_one_a_step_are_counted() -> None:
 
 def test_steps_are_counted_by_their_faces() -> None:
     surface = sm.samples.torus_surface(100, 80)
-    work = Work.of(surface, Budget(np.inf), refine=True)
+    work = Work.of(surface, Budget(30.0), refine=True)
     assert (work.n_faces, work.most) == (16_000, 40)
     most = work.steps()
     work.spend(10)
@@ -104,15 +111,47 @@ def test_steps_are_counted_by_their_faces() -> None:
 
 
 def test_faces_may_be_so_many_that_steps_are_left() -> None:
-    work = Work.of(sm.samples.torus_surface(100, 80), Budget(np.inf), refine=True)
-    for steps in (1, 60, 1000):
+    work = Work.of(sm.samples.torus_surface(100, 80), Budget(30.0), refine=True)
+    growth, work.growth = work.growth, np.inf
+    for steps in (50, 60, 1000):
         most = work.most_faces(steps)
         assert work.steps(most) >= steps > work.steps(most + 1)
+    assert work.most_faces(1) == 10**6  # whatever there is time for
+    work.growth = growth
+    assert work.steps(work.most_faces(1)) > 100
     work.spend(work.steps())
     assert work.most_faces(60) < 1000
 
 
-@pytest.mark.parametrize(("affordable", "most"), [(0, 52_000), (60_000, 60_000), (10**6, 92_000)])
+def test_there_may_be_more_faces_and_steps_with_more_time() -> None:
+    surface = sm.samples.torus_surface(100, 80)
+    works = [Work.of(surface, Budget.of(limit, 16_000), refine=True) for limit in (2e-3, 1e-2)]
+    few, many = (work.most_faces(1) / surface.n_faces for work in works)
+    assert 3.5 < few < 4.0 and many == pytest.approx(5.0 * few, rel=1e-3)
+    assert works[1].steps() == pytest.approx(5 * works[0].steps(), abs=5)
+    unrefined = [Work.of(surface, Budget.of(limit, 16_000), refine=False) for limit in (2e-3, 1e-2)]
+    assert unrefined[0].most == unrefined[1].most < works[1].steps()
+
+
+def test_what_is_reserved_is_no_time_for_anything_else() -> None:
+    surface = small_handle(1, 3.8)
+    newton, work = start_of(surface).newton(), Work.of(surface, Budget(10.0), refine=True)
+    assert newton.least_facing() <= 0.0
+    work.reserved = 0.96
+    assert work.late()
+    assert unfold_faces(newton, 2, None, None, work.late) == []
+    assert approach_areas(newton, 2, None, work.late)[0] == []
+    work.reserved = 0.0
+    assert not work.late()
+    assert len(unfold_faces(newton, 2, None, None, work.late)) == 2
+
+
+def test_the_last_few_are_more_of_more_faces() -> None:
+    assert not many_folded(30, 1000) and many_folded(31, 60_000)
+    assert not many_folded(45, 176_868) and many_folded(89, 176_868)
+
+
+@pytest.mark.parametrize(("affordable", "most"), [(0, 52_000), (60_000, 60_000)])
 def test_faces_become_more_where_steps_are_left(affordable: int, most: int) -> None:
     start = start_of(sm.samples.torus_surface(100, 80))
     assert start.level.surface.n_faces == 16_000
@@ -126,7 +165,7 @@ def test_work_counts_what_elimination_takes() -> None:
     steps = []
     for surface in (long, square):
         start = start_of(surface)
-        newton, work = start.newton(), Work.of(surface, Budget(np.inf), refine=True)
+        newton, work = start.newton(), Work.of(surface, Budget(30.0), refine=True)
         work.begin(newton, surface.n_faces)
         steps.append(work.steps())
     assert steps[0] > 1.1 * steps[1]  # thin separators
