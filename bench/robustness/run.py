@@ -38,7 +38,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
     parser.add_argument("--threads", type=int, help="threads of each; default: all cores, shared")
     parser.add_argument(
-        "--limit", type=float, help="processor ms per tet, 1 if left out, or per face, 10"
+        "--limit", type=float, help="processor ms per tet, 1 if left out, or per face, 20"
     )
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "robustness")
     parser.add_argument("--again", action="store_true", help="run also what has a record")
@@ -60,7 +60,7 @@ def job_of(case: cases.Case, options: argparse.Namespace, kind: str) -> dict[str
         "mesh": str(case.path),
         "record": f"{base}.json",
         "map": None if options.no_maps else f"{base}_map.npz",
-        "per_element": 1e-3 * (options.limit or (10.0 if kind == "area" else 1.0)),
+        "per_element": 1e-3 * (options.limit or (20.0 if kind == "area" else 1.0)),
     }
 
 

@@ -56,7 +56,7 @@ _ROUNDS = 3
 _LEAST_STEPS = 10  # from where areas are nearly right, however little work is left
 ROUND_STEPS = 20  # of each round; fewer are not worth it
 _UNFOLDING = (0.6, (10, 60))  # a share of the work, and steps, until no face is folded
-_LAST_RESERVE = 0.2  # of what was reserved, until the last few faces are turned
+_LAST_RESERVE = 0.6  # of what was reserved, until the last few faces are turned
 _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
@@ -361,9 +361,11 @@ def mapped_finer(
             return None
         newton, n_faces, reserved = finer.newton(), finer.level.surface.n_faces, work.reserved
         if not turned_outward(newton, n_faces, pace):
-            # On the last few of them, most of what is reserved is well spent.
-            if not reserved or many_folded(newton.measures().flips, n_faces):
+            if many_folded(newton.measures().flips, n_faces):
                 return None
+            # Edges of the last few are halved, and most of what is reserved is well spent.
+            finer = replace(finer, angles=newton.angles).outward()
+            newton, n_faces = finer.newton(), finer.level.surface.n_faces
             work.reserved *= _LAST_RESERVE
             if not turned_outward(newton, n_faces, pace):
                 work.reserved = reserved

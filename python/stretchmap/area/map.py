@@ -52,7 +52,7 @@ def area_map(
     balance: float = 1.0,
     sem_iter: int = 10,
     refine: bool = True,
-    time_limit: float = 1e-2,
+    time_limit: float = 2e-2,
     keep_best: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,

@@ -13,9 +13,9 @@ from ..mesh.surfaces import TriMesh
 # In units of what a face adds to a step besides its share of the elimination: so many a face of
 # the surface given, and no fewer than those.
 _EACH, _LEAST = 1200.0, 5e6
-# Where edges may be halved, so many for each second there is, once or twice what a processor gets
+# Where edges may be halved, so many for each second there is, no more than a slow processor gets
 # done; and as many times the faces as those are that many a face.
-_A_SECOND, _A_TIME = 6.7e5, 320.0
+_A_SECOND, _A_TIME = 4.5e5, 430.0
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
 _MOST_FACES = 10**6
