@@ -105,8 +105,8 @@ def area_map(
         than ``surface``. Not with ``finish="none"`` or a ``balance`` below 1.
     time_limit : float
         Processor seconds per face, of all threads, that may be spent: where they are used up, the
-        steps end. Small surfaces get some seconds. Most take a fiftieth of it; what needs many more
-        faces may have as many more as there is time for.
+        steps end. Small surfaces get some seconds. Few take more than a tenth of it: those that
+        need many times their faces, of which there may be as many more as there is time for.
     keep_best : bool
         Return the map even if it is not certified.
     threads : int, optional
@@ -148,9 +148,12 @@ def area_map(
     it, further where that takes too many faces. Newton steps that let faces look inward lead to
     nearly right areas, edges that sag too much by then are halved, too, as are those of faces left
     looking inward; then the steps above follow. Where areas stay off, the edges that sag most in
-    faces that are off are halved, three times at most. There become no more than five times as many
-    faces, and 12,000. All steps together cost no more than some seven hundred on the surface
-    itself, more on one of less than 4,000 faces, and no more than ``time_limit``.
+    faces that are off are halved, three times at most, on surfaces of more than 40,000 faces, too.
+    There become no more than 19 times as many faces with the usual ``time_limit``, in proportion
+    with another, and no more than a million; 2.5 times as many and 12,000 at any rate. All steps
+    together cost no more than even a slow machine has time for, so that the result does not depend
+    on it; without ``refine`` no more than some seven hundred steps, more on a surface of less than
+    4,000 faces.
 
     Where faces of the polyhedral image stay folded, the map is made once more with shapes counting
     in the chart, and more until none is; ``stop_reason`` then says so.
