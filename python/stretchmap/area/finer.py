@@ -34,7 +34,7 @@ from .finish import (
 )
 from .flat import start_angles
 from .route import Made
-from .work import RINGS, Work
+from .work import MOST_FACES, RINGS, Work
 
 _log = logging.getLogger("stretchmap")
 
@@ -329,7 +329,7 @@ class Finer:
         """Whether so many vertices more make more faces than may be, or than that share of them."""
         n_faces = len(self.added.parent_face)
         given = n_faces * self.share
-        most = max(_GROWTH * given + _SPARE, self.affordable)
+        most = max(min(_GROWTH * given + _SPARE, MOST_FACES), self.affordable)
         return n_faces + 2 * more > share * most
 
 

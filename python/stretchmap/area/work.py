@@ -18,7 +18,7 @@ _EACH, _LEAST = 1200.0, 5e6
 _A_SECOND, _A_TIME = 4.5e5, 430.0
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
-_MOST_FACES = 10**6
+MOST_FACES = 10**6  # of a surface with edges halved
 _UNREFINED = 40  # steps where edges can be halved after them
 # Steps that others take as long as: one in the flat chart, one without a barrier against faces that
 # look inward, halving edges until few sag, and rings made exact.
@@ -134,7 +134,7 @@ class Work:
         while many - few > 1:
             middle = (few + many) // 2
             few, many = (middle, many) if self.steps(middle) >= steps else (few, middle)
-        return int(min(few, self.growth * self.n_faces, _MOST_FACES))
+        return int(min(few, self.growth * self.n_faces, MOST_FACES))
 
     def late(self) -> bool:
         """Whether what time is left is reserved, or for the certificate."""

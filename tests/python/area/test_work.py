@@ -180,6 +180,14 @@ def test_faces_become_more_where_steps_are_left(affordable: int, most: int) -> N
     assert start.too_many((most - 16_000) // 2, 0.9)
 
 
+def test_faces_of_large_surfaces_become_no_more_than_memory_holds(monkeypatch) -> None:
+    start = start_of(sm.samples.torus_surface(100, 80))
+    monkeypatch.setattr(finer, "MOST_FACES", 20_000)
+    assert not start.too_many(2000) and start.too_many(2001)
+    monkeypatch.setattr(finer, "MOST_FACES", 10_000)
+    assert start.too_many(1)
+
+
 def test_work_counts_what_elimination_takes() -> None:
     long, square = sm.samples.torus_surface(640, 10), sm.samples.torus_surface(80, 80)
     steps = []
