@@ -14,8 +14,8 @@ from ..mesh.surfaces import TriMesh
 # the surface given, and no fewer than those.
 _EACH, _LEAST = 1200.0, 5e6
 # Where edges may be halved, so many for each second there is, no more than a slow processor gets
-# done; and as many times the faces as those are that many a face.
-_A_SECOND, _A_TIME = 4.5e5, 430.0
+# done; and a face for so many, where steps are left for them.
+_A_SECOND, _A_FACE = 4.5e5, 430.0
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
 MOST_FACES = 10**6  # of a surface with edges halved
@@ -45,8 +45,6 @@ class Work:
     clock : Budget
     reserved : float
         Share of all that is left for what follows should this lead nowhere.
-    growth : float
-        Most faces there may be, over those of the surface given.
     """
 
     n_faces: int
@@ -54,8 +52,6 @@ class Work:
     most: int
     clock: Budget = field(default_factory=lambda: Budget(math.inf))
     reserved: float = 0.0
-    growth: float = math.inf
-    _whole: float = 0.0  # all there was
     _flops: float = _TYPICAL  # of the surfaces seen last
     _begun: float | None = None
     _newton: _core.area.SurfaceNewton | None = None  # whose steps have begun
@@ -63,13 +59,14 @@ class Work:
     _units: float = 0.0  # of which is known how long they took
     _seconds: float = 0.0
 
+    def __post_init__(self) -> None:
+        self._whole = self.left
+
     @classmethod
     def of(cls, surface: TriMesh, clock: Budget, *, refine: bool) -> Work:
         """All of it; of finite time where edges may be halved."""
-        n_faces = surface.n_faces
-        units = _A_SECOND * clock.seconds if refine else _EACH * n_faces
-        growth, left = units / (_A_TIME * n_faces), max(units, _LEAST)
-        work = cls(n_faces, left, _UNREFINED, clock, growth=growth, _whole=left)
+        units = _A_SECOND * clock.seconds if refine else _EACH * surface.n_faces
+        work = cls(surface.n_faces, max(units, _LEAST), _UNREFINED, clock)
         if not refine:
             work.most = work.steps()
         return work
@@ -134,7 +131,7 @@ class Work:
         while many - few > 1:
             middle = (few + many) // 2
             few, many = (middle, many) if self.steps(middle) >= steps else (few, middle)
-        return int(min(few, self.growth * self.n_faces, MOST_FACES))
+        return min(few, int(self._whole / _A_FACE), MOST_FACES)
 
     def late(self) -> bool:
         """Whether what time is left is reserved, or for the certificate."""

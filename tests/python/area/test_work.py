@@ -61,7 +61,8 @@ def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
     taken, halved = [], []
 
     def unfold(newton, steps, progress, pace, late):
-        taken.append((steps, newton.least_facing(), work.reserved))
+        assert late == work.late
+        taken.append((newton.least_facing(), work.reserved))
         return []
 
     def outward(self: Finer) -> Finer:
@@ -77,8 +78,8 @@ def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
         work = Work(start.level.surface.n_faces, 1e9, 40, reserved=0.25)
         assert mapped_finer(start, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work) is None
         assert len(taken) == times and work.reserved == 0.25
-        assert [reserved for _, _, reserved in taken] == [0.25, 0.15][:times]
-        assert len(halved) == times - 1
+        assert [reserved for _, reserved in taken] == [0.25, 0.15][:times]
+        assert len(halved) == times - 1 and all(facing <= 0.0 for facing, _ in taken)
 
 
 def test_edges_of_the_last_few_folded_faces_are_halved(monkeypatch) -> None:
@@ -131,13 +132,12 @@ def test_steps_are_counted_by_their_faces() -> None:
 
 
 def test_faces_may_be_so_many_that_steps_are_left() -> None:
-    work = Work.of(sm.samples.torus_surface(100, 80), Budget(60.0), refine=True)
-    growth, work.growth = work.growth, np.inf
-    for steps in (50, 60, 1000):
+    work = Work(16_000, 1e9, 40)
+    for steps in (200, 500, 1000):
         most = work.most_faces(steps)
         assert work.steps(most) >= steps > work.steps(most + 1)
     assert work.most_faces(1) == 10**6  # whatever there is time for
-    work.growth = growth
+    work = Work.of(sm.samples.torus_surface(100, 80), Budget(60.0), refine=True)
     assert work.steps(work.most_faces(1)) > 100
     work.spend(work.steps())
     assert work.most_faces(60) < 1000
@@ -161,6 +161,7 @@ def test_what_is_reserved_is_no_time_for_anything_else() -> None:
     assert work.late()
     assert unfold_faces(newton, 2, None, None, work.late) == []
     assert approach_areas(newton, 2, None, work.late)[0] == []
+    assert start_of(surface).approached(None, work)[2] == []
     work.reserved = 0.0
     assert not work.late()
     assert len(unfold_faces(newton, 2, None, None, work.late)) == 2
