@@ -57,7 +57,10 @@ class Finest:
     progress: Progress | None
 
     def found(self, *, refine: bool) -> AreaMap:
-        """The map of a surface as fine as there is work for, certified or not."""
+        """The map of a surface as fine as there is work for, certified or not.
+
+        One that is mapped by way of coarser ones has no chart of its own to begin with.
+        """
         level, finer, coarse = self.equal.level, None, False
         if refine and len(self.stack) == 1:
             self.work.reserved = _RESERVED

@@ -168,3 +168,16 @@ def test_unfolding_that_is_jammed_ends(monkeypatch, lengths, taken):
 @pytest.mark.parametrize(("share", "taken"), [(0.9, 100), (0.99, 11), (1.0, 11), (1.1, 11)])
 def test_unfolding_that_leaves_as_many_folded_ends(monkeypatch, share, taken):
     assert _steps_taken(monkeypatch, (0.5,), share) == taken
+
+
+@pytest.mark.parametrize(("n_faces", "taken"), [(1000, 6), (80_000, 6), (100_000, 11)])
+def test_the_last_few_folded_faces_of_many_get_more_steps(monkeypatch, n_faces, taken):
+    """Forty-five of a thousand are not the last few, of a hundred thousand they are."""
+    monkeypatch.setattr(finish, "_record", lambda *_: SimpleNamespace(flips=45))
+    newton = SimpleNamespace(
+        angles=np.empty((n_faces // 2, 2)),
+        least_facing=lambda: -0.1,
+        step=lambda _: SimpleNamespace(step=0.5, before=1.0, after=0.99),
+        measures=lambda: None,
+    )
+    assert len(finish.unfold_faces(newton, 100, None, finish.Pace())) == taken
