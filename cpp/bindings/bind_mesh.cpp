@@ -1,6 +1,7 @@
 #include "arrays.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
 #include "stretchmap/mesh/fill_borders.hpp"
+#include "stretchmap/mesh/longest_first.hpp"
 #include "stretchmap/mesh/orient.hpp"
 #include "stretchmap/mesh/overconstrained.hpp"
 #include "stretchmap/mesh/size.hpp"
@@ -97,14 +98,17 @@ void bind_overconstrained(py::module_& m) {
       .def_readonly("faces", &OverconstrainedElements::faces)
       .def_readonly("tets", &OverconstrainedElements::tets);
   py::class_<Refinement>(m, "Refinement")
-      .def(py::init([](const PointsRef& points, const TetsRef& tets) {
-             return refine_overconstrained(points, tets, signal_poll());
+      .def(py::init([](const PointsRef& points, const TetsRef& tets, const PointsRef& seen) {
+             return refine_overconstrained(points, tets, seen, signal_poll());
            }),
-           py::arg("points").noconvert(), py::arg("tets").noconvert(), release_gil())
+           py::arg("points").noconvert(), py::arg("tets").noconvert(),
+           py::arg("seen").noconvert(), release_gil())
       .def_readonly("points", &Refinement::points)
       .def_readonly("tets", &Refinement::tets)
       .def_readonly("parent_tet", &Refinement::parent_tet)
       .def_readonly("split", &Refinement::split);
+  m.def("longest_first", &longest_first, py::arg("points").noconvert(),
+        py::arg("edges").noconvert(), release_gil());
 }
 
 void bind_fill_borders(py::module_& m) {

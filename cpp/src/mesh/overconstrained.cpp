@@ -11,6 +11,7 @@
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/parallel.hpp"
 #include "stretchmap/mesh/facets.hpp"
+#include "stretchmap/mesh/longest_first.hpp"
 #include "stretchmap/mesh/tet_boundary.hpp"
 
 namespace stretchmap::mesh {
@@ -35,7 +36,7 @@ struct Split {
 
 struct Plan {
   OverconstrainedElements found;
-  std::vector<Split> splits;  // by tet, then by added vertex
+  std::vector<Split> splits;
 };
 
 // Vertices and edges on the boundary.
@@ -123,9 +124,6 @@ Plan plan_splits(const TetsRef& tets, Index n_vertices, const Poll& poll) {
   plan_edges(tets, n_vertices, rim, plan, poll);
   plan_faces(tets, n_vertices, n_vertices + static_cast<Index>(plan.found.edges.rows()), rim, plan,
              poll);
-  std::sort(plan.splits.begin(), plan.splits.end(), [](const Split& a, const Split& b) {
-    return std::pair(a.tet, a.vertex) < std::pair(b.tet, b.vertex);
-  });
   Mask touched(tets.rows(), 0);
   for (const Split& split : plan.splits) touched[split.tet] = 1;
   plan.found.tets = set_entries(touched);
@@ -160,7 +158,8 @@ OverconstrainedElements overconstrained_elements(const TetsRef& tets, Index n_ve
   return plan_splits(tets, n_vertices, poll).found;
 }
 
-Refinement refine_overconstrained(const PointsRef& points, const TetsRef& tets, const Poll& poll) {
+Refinement refine_overconstrained(const PointsRef& points, const TetsRef& tets,
+                                  const PointsRef& seen, const Poll& poll) {
   const Index n = static_cast<Index>(points.rows());
   Plan plan = plan_splits(tets, n, poll);
   const Index n_edges = static_cast<Index>(plan.found.edges.rows());
@@ -177,6 +176,12 @@ Refinement refine_overconstrained(const PointsRef& points, const TetsRef& tets, 
     result.points.row(n + n_edges + j) =
         (points.row(f[0]) + points.row(f[1]) + points.row(f[2])) / 3;
   }
+  IndexVec turn = IndexVec::LinSpaced(n_edges + n_faces, 0, n_edges + n_faces - 1);
+  const IndexVec order = longest_first(seen, plan.found.edges);
+  for (Index k = 0; k < n_edges; ++k) turn[order[k]] = k;
+  std::sort(plan.splits.begin(), plan.splits.end(), [&](const Split& a, const Split& b) {
+    return std::pair(a.tet, turn[a.vertex - n]) < std::pair(b.tet, turn[b.vertex - n]);
+  });
   std::vector<Tet> refined, pieces;
   std::vector<Index> parents;
   refined.reserve(tets.rows() + 2 * plan.splits.size());

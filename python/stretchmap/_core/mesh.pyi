@@ -2,7 +2,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BorderFill', 'OverconstrainedElements', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
+__all__: list[str] = ['BorderFill', 'OverconstrainedElements', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'longest_first', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
 class SurfaceTopology:
     def __init__(self, faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
@@ -145,7 +145,7 @@ class OverconstrainedElements:
     def tets(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         ...
 class Refinement:
-    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"]) -> None:
+    def __init__(self, points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], seen: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"]) -> None:
         ...
     @property
     def parent_tet(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
@@ -181,6 +181,8 @@ def enclosed_volume(points: typing.Annotated[numpy.typing.NDArray[numpy.float64]
 def face_area_vectors(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
     ...
 def face_areas(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    ...
+def longest_first(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], edges: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
     ...
 def misoriented_faces(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
     ...

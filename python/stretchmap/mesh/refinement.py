@@ -154,16 +154,19 @@ class Refinement:
         )
 
 
-def refine_overconstrained(solid: TetMesh) -> Refinement:
+def refine_overconstrained(solid: TetMesh, seen: NDArray[np.float64] | None = None) -> Refinement:
     """Split every interior edge and face whose vertices all lie on the boundary.
 
     Each such edge is halved at its midpoint, with all tets round it; each such face whose edges lie
-    on the boundary is split into three at its centroid, with the two tets beside it. Orientation,
+    on the boundary is split into three at its centroid, with the two tets beside it. Of edges with
+    a tet in common the longest is halved first, which keeps the pieces in shape. Orientation,
     boundary and volume are kept. The result depends on the input only.
 
     Parameters
     ----------
     solid : TetMesh
+    seen : ndarray, shape (n, 3), optional
+        Where the vertices are when lengths are compared, if not where they are in the solid.
 
     Returns
     -------
@@ -188,7 +191,7 @@ def refine_overconstrained(solid: TetMesh) -> Refinement:
     >>> len(overconstrained_elements(refined.solid)), refined.n_split > 0
     (0, True)
     """
-    found = _core.mesh.Refinement(solid.V, solid.T)
+    found = _core.mesh.Refinement(solid.V, solid.T, solid.V if seen is None else seen)
     split = found.split
     n_split = len(split.edges) + len(split.faces)
     return Refinement(

@@ -106,8 +106,10 @@ class VolumeProblem:
             The boundary image is inside out.
         """
         refinement = None
+        unstretch = unstretching(solid.V, solid.T)
         if refine:
-            refinement = refine_overconstrained(solid)
+            seen = None if unstretch is None else np.ascontiguousarray(solid.V @ unstretch)
+            refinement = refine_overconstrained(solid, seen)
         elif refine is not None:
             _refuse_overconstrained(solid)
         mesh = solid if refinement is None else refinement.solid
@@ -127,7 +129,6 @@ class VolumeProblem:
         else:
             x[ids] = image
         V = (mesh.V - mesh.V.mean(axis=0)) / solid.volume ** (1.0 / 3.0)
-        unstretch = unstretching(solid.V, solid.T)
         return cls(
             solid=mesh,
             refinement=refinement,
@@ -142,10 +143,10 @@ class VolumeProblem:
         )
 
     def halved(self, edges: NDArray[np.int32]) -> VolumeProblem:
-        """With interior edges (e, 2) of the solid halved, in the image, too."""
+        """With interior edges (e, 2) of the solid halved, the longest first; in the image, too."""
         assert self.refinement is not None
         passes = len(self.refinement.halved)
-        refinement = self.refinement.halve(edges)
+        refinement = self.refinement.halve(edges[_core.mesh.longest_first(self.V, edges)])
         fields = {"V": self.V, "x": self.x}
         if self.scale is not None:
             fields["scale"] = self.scale

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
 import shapes
+from stretchmap import _core
 from stretchmap.errors import ArrayError, NonManifoldError
 from stretchmap.mesh.meshes import TetMesh
 from stretchmap.mesh.overconstrained import overconstrained_elements
@@ -124,6 +127,56 @@ def test_same_input_same_bits_and_relabelling():
     other = refine_overconstrained(TetMesh(points, rank[solid.T[rng.permutation(solid.n_tets)]]))
     assert other.n_split == first.n_split
     check(TetMesh(points, rank[solid.T]))
+
+
+def _midpoints_in_pieces(done, solid, lengths) -> int:
+    """Input tets whose pieces all have the midpoint of the longest of its edges that are halved."""
+    number = {tuple(ends): k for k, ends in enumerate(done.parents.tolist())}
+    seen = 0
+    for tet, corners in enumerate(solid.T.tolist()):
+        pairs = [(min(p), max(p)) for p in combinations(corners, 2)]
+        halved = sorted((p for p in pairs if p in number), key=lambda p: -lengths(p))
+        # Those of nearly one length are halved in any order.
+        if len(halved) > 1 and lengths(halved[0]) > 1.05 * lengths(halved[1]):
+            pieces = done.solid.T[done.parent_tet == tet]
+            assert (pieces == solid.n_vertices + number[halved[0]]).any(axis=1).all()
+            seen += 1
+    return seen
+
+
+def test_the_longest_edge_of_a_tet_is_halved_first():
+    solid = cubes(shapes.RING)
+    points = solid.V @ np.diag([1.0, 1.3, 1.9]) @ np.array([[1, 0.2, 0], [0, 1, 0.1], [0.3, 0, 1]])
+    for V, seen in ((points, None), (solid.V, points)):
+        bent = TetMesh(V, solid.T)
+        done = refine_overconstrained(bent, seen)
+
+        def length(pair):
+            return np.linalg.norm(points[pair[0]] - points[pair[1]])
+
+        assert _midpoints_in_pieces(done, bent, length) > 20
+        np.testing.assert_array_equal(done.solid.V, done.prolong(V))
+
+
+def test_rounding_does_not_decide_which_edge_is_halved_first():
+    """Edges of a grid are as long as each other, wherever it lies."""
+    solid, expected = cubes(shapes.RING), refine_overconstrained(cubes(shapes.RING)).solid.T
+    rng = np.random.default_rng(5)
+    for scale in (1.0, 1e-30, 3e7):
+        turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+        moved = TetMesh(scale * (solid.V @ turn + rng.standard_normal(3)), solid.T)
+        np.testing.assert_array_equal(refine_overconstrained(moved).solid.T, expected)
+
+
+def test_edges_from_the_longest_to_the_shortest():
+    points = np.zeros((7, 3))
+    points[1:6, 0] = [1.0, 1.0 + 1e-9, 5.0, 2.0, np.sqrt(2.0)]
+    edges = np.array([[0, 1], [0, 6], [0, 2], [0, 3], [0, 4], [5, 0]], np.int32)
+    order = _core.mesh.longest_first(points, edges)
+    np.testing.assert_array_equal(order, [3, 4, 5, 0, 2, 1])  # of no length at all: the last
+    assert len(_core.mesh.longest_first(points, edges[:0])) == 0
+    np.testing.assert_array_equal(_core.mesh.longest_first(0.0 * points, edges), np.arange(6))
 
 
 def test_prolong_wants_one_row_per_input_vertex():
