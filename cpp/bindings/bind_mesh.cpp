@@ -101,8 +101,8 @@ void bind_overconstrained(py::module_& m) {
       .def(py::init([](const PointsRef& points, const TetsRef& tets, const PointsRef& seen) {
              return refine_overconstrained(points, tets, seen, signal_poll());
            }),
-           py::arg("points").noconvert(), py::arg("tets").noconvert(),
-           py::arg("seen").noconvert(), release_gil())
+           py::arg("points").noconvert(), py::arg("tets").noconvert(), py::arg("seen").noconvert(),
+           release_gil())
       .def_readonly("points", &Refinement::points)
       .def_readonly("tets", &Refinement::tets)
       .def_readonly("parent_tet", &Refinement::parent_tet)

@@ -31,10 +31,9 @@ struct Refinement {
 OverconstrainedElements overconstrained_elements(const TetsRef& tets, Index n_vertices,
                                                  const Poll& poll = {});
 
-// Of edges with a tet in common the longest is halved first, with the vertices where they are `seen`.
-// Orientation and total volume are kept. A tet that is its own component, with all its faces on the
-// boundary, has nothing to split and stays.
-// \throws as above.
+// Of edges with a tet in common the longest is halved first, with the vertices where they are
+// `seen`. Orientation and total volume are kept. A tet that is its own component, with all its
+// faces on the boundary, has nothing to split and stays. \throws as above.
 Refinement refine_overconstrained(const PointsRef& points, const TetsRef& tets,
                                   const PointsRef& seen, const Poll& poll = {});
 
