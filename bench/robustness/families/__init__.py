@@ -60,6 +60,7 @@ class Family:
 def families() -> dict[str, Family]:
     """All families by name."""
     from . import (
+        bare,
         coarse,
         drilled,
         handles,
@@ -77,6 +78,6 @@ def families() -> dict[str, Family]:
 
     rooms = (
         tubes, drilled, knots, rings, handles, spiky, coarse, stretched, shells, pillars, ribbons,
-        parts, pipes,
+        parts, pipes, bare,
     )  # fmt: skip
     return {family.name: family for room in rooms for family in room.FAMILIES}

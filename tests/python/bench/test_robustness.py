@@ -25,7 +25,8 @@ def test_there_are_the_families_asked_for(room):
 
 
 @pytest.mark.parametrize(
-    "name", ["raw_tubes", "thorny", "cut_grids", "stacks", "bottles", "ribbons", "parts", "pipes"]
+    "name",
+    ["raw_tubes", "thorny", "cut_grids", "stacks", "bottles", "ribbons", "parts", "pipes", "bare"],
 )
 def test_a_seed_is_a_solid_torus_and_always_the_same(name):
     from families import families
@@ -69,6 +70,14 @@ def test_walls_of_pipes_have_hardly_a_vertex_inside():
     assert all(3_000 < solid.n_tets < 20_000 for solid in solids)
     inside = [solid.n_vertices - solid.surface.n_vertices for solid in solids]
     assert np.median(inside) == 0
+
+
+def test_bare_solids_have_hardly_a_vertex_inside():
+    from families import families
+
+    for seed in range(4):
+        solid = families()["bare"].draw(seed, 0.2)
+        assert (solid.boundary_index < 0).sum() <= 10 < solid.n_vertices
 
 
 def test_more_parts_than_one_hole_are_refused():
