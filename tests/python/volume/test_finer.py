@@ -45,15 +45,16 @@ def mean_error(result: sm.VolumeMap) -> float:
 
 
 def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
-    """Of one plate the input's tets gain a third or next to nothing, of seven a sixth.
+    """The input's tets gain by a third or next to nothing, together a fifth; all tets of short
+    plates a fifth, of long ones as often nothing, there being more small ones.
 
-    How many tets are added is up to rounding, and what is gained goes with it: the seven are mapped
-    with solves of three exactnesses. The mean over all tets gains less, there being more small
-    ones.
+    How many tets are added is up to rounding, and what is gained goes with it: the plates are
+    mapped with solves of three exactnesses.
     """
-    shapes = [(8, 3, 3), (15, 3, 3), (16, 3, 3), (18, 3, 3), (8, 4, 3), (9, 5, 3), (12, 5, 3)]
-    solids = [plate(*shape) for shape in shapes] * 3
-    exact = [sm.VolumeOptions(cg_tol=tol) for tol in (0.05, 0.01, 0.001) for _ in shapes]
+    short = [(8, 3, 3), (9, 5, 3), (8, 4, 4), (7, 3, 4)]
+    long = [(15, 3, 3), (16, 3, 3), (18, 3, 3), (8, 4, 3), (12, 5, 3), (14, 4, 3), (17, 3, 3)]
+    solids = [plate(*shape) for shape in short + long] * 3
+    exact = [sm.VolumeOptions(cg_tol=tol) for tol in (0.05, 0.01, 0.001) for _ in short + long]
 
     def maps() -> list[sm.VolumeMap]:
         return [sm.volume_map(s, options=o) for s, o in zip(solids, exact, strict=True)]
@@ -61,14 +62,18 @@ def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
     finer = maps()
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
     coarse = maps()
-    for solid, before, after in zip(solids, coarse, finer, strict=True):
+    errors = []
+    for k, (solid, before, after) in enumerate(zip(solids, coarse, finer, strict=True)):
         assert not before.refinement.halved and after.refinement.halved
         assert before.converged and after.converged and after.certificate.certified
         assert unevenness(after, solid) < unevenness(before, solid)
         assert mean_error(before) > engine._UNEVEN
         np.testing.assert_array_equal(after.mesh.V[: solid.n_vertices], solid.V)
         np.testing.assert_array_equal(after.mesh.boundary_vertices, solid.boundary_vertices)
-    assert sum(map(mean_error, finer)) < 0.98 * sum(map(mean_error, coarse))
+        if k % len(short + long) < len(short):
+            errors.append((mean_error(after), mean_error(before)))
+    assert all(after < before for after, before in errors)
+    assert sum(after for after, _ in errors) < 0.9 * sum(before for _, before in errors)
     assert sum(map(unevenness, finer, solids)) < 0.85 * sum(map(unevenness, coarse, solids))
     n_finer, n_coarse = (sum(each.mesh.n_tets for each in made) for made in (finer, coarse))
     assert n_finer < 1.25 * n_coarse
