@@ -7,6 +7,8 @@ import pytest
 
 import stretchmap as sm
 from shapes import RING, cubes
+from stretchmap.mesh.refinement import refine_overconstrained
+from stretchmap.volume import problem
 from stretchmap.volume.anisotropy import unstretching
 
 SOLID = sm.samples.bumpy_torus(1500)
@@ -59,3 +61,14 @@ def test_a_held_boundary_keeps_the_areas_of_the_surface_as_it_is():
     result = sm.volume_map(stretched(np.diag([20.0, 1.0, 1.0])), boundary="frozen")
     assert result.certificate.certified
     assert result.boundary_map.distortion.element_std < 0.2
+
+
+def test_edges_are_as_long_as_without_the_stretch(monkeypatch):
+    """The longest are halved first, and what all tets are stretched by makes none of them long."""
+    solid, undone = sm.TetMesh(*cubes(RING)), np.diag([0.2, 1.0, 2.0])
+    monkeypatch.setattr(problem, "unstretching", lambda V, T: undone)
+    found = problem.VolumeProblem.of(solid, solid.V[solid.boundary_vertices]).solid
+    expected = refine_overconstrained(solid, solid.V @ undone).solid
+    np.testing.assert_array_equal(found.T, expected.T)
+    np.testing.assert_array_equal(found.V, expected.V)
+    assert not np.array_equal(found.T, refine_overconstrained(solid).solid.T)

@@ -95,6 +95,23 @@ def test_halved_edges_leave_the_way_back(bolt, refinement):
     np.testing.assert_array_equal(*rows)
 
 
+def test_of_edges_with_a_tet_in_common_the_longest_is_halved_first(bolt):
+    problem = VolumeProblem.of(*bolt)
+    edges = surrounding_edges(problem.solid, np.array([0]))
+    assert len(edges) > 10
+    lengths = np.linalg.norm(np.diff(problem.V[edges], axis=1)[:, 0], axis=1)
+    first = problem.halved(edges).refinement.halved[0]
+    at = [np.flatnonzero((edges == pair).all(axis=1))[0] for pair in first]
+    # Those that had to wait have a tet in common with a longer one, or one as long.
+    ends = [set(pair) for pair in edges[at].tolist()]
+    tets = [set(tet) for tet in problem.solid.T.tolist()]
+    for k in np.setdiff1d(np.arange(len(edges)), at):
+        near = [tet for tet in tets if set(edges[k].tolist()) <= tet]
+        rivals = [i for i, pair in zip(at, ends, strict=True) if any(pair <= tet for tet in near)]
+        assert not rivals or lengths[rivals].max() > 0.97 * lengths[k]
+    assert lengths.argmax() in at and not (np.diff(lengths[at]) > 0.05 * lengths.max()).any()
+
+
 def test_edges_that_surround_tets_are_all_those_of_vertices_inside_next_to_them():
     solid = samples.solid_torus(3000)
     inside = set(range(solid.n_vertices)) - set(solid.boundary_vertices.tolist())
