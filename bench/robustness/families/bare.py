@@ -1,15 +1,15 @@
-"""Solids without a vertex inside: a constrained Delaunay mesh, its quality not asked for."""
+"""Solids without a vertex inside: filled by a mesher that is not asked for quality."""
 
 from __future__ import annotations
 
 import numpy as np
-import tetgen
 
-from stretchmap import TetMesh
+from stretchmap import TetMesh, samples
 
 from . import Family, drilled, knots, rings, spiky, tubes
 
 _SURFACES = (tubes.even_tubes, drilled.even, knots.knots, rings.fat, spiky.spiky)
+_ANY = 1e6  # ratio of circumradius to shortest edge
 
 
 def bare(rng: np.random.Generator, n_tets: float) -> TetMesh:
@@ -18,9 +18,7 @@ def bare(rng: np.random.Generator, n_tets: float) -> TetMesh:
     A few vertices may be added inside, without which there would be no such mesh.
     """
     surface = _SURFACES[int(rng.integers(len(_SURFACES)))](rng, n_tets)
-    made = tetgen.TetGen(np.asarray(surface.V), np.asarray(surface.F))
-    V, T = made.tetrahedralize(switches="pYQ")[:2]
-    return TetMesh(V, T[:, :4], orient=True)
+    return samples.tetrahedralize(surface, quality=_ANY)
 
 
 FAMILIES = (Family("bare", "no vertex inside, tets that reach right across", True, bare),)
