@@ -10,7 +10,7 @@
 namespace stretchmap::mesh {
 
 // (e) the edges from the longest to the shortest; the result depends on neither the scale nor,
-// but for edges whose lengths agree within 2 %, on their order.
+// but for edges whose lengths agree within 3 %, on their order.
 IndexVec longest_first(const PointsRef& points, const EdgesRef& edges);
 
 }  // namespace stretchmap::mesh
