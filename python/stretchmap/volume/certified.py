@@ -72,6 +72,9 @@ def certified_map(
     left_off = None  # the best one, where it made room
     before, latest = budget.left, 0.0  # processor seconds the last start took, but for comparing it
 
+    def nearly() -> bool:
+        return 0 < least[1] <= max(_NEARLY, _NEARLY_SHARE * solid.n_tets)
+
     def in_turn() -> Iterator[Start]:
         nonlocal left_off
         for another in itertools.chain(starts, [None]):
@@ -83,8 +86,7 @@ def certified_map(
                 if thinner is None:
                     return
                 yield thinner
-            few = 0 < least[1] <= max(_NEARLY, _NEARLY_SHARE * solid.n_tets)
-            late = max(_LATE * budget.seconds, latest) if few else _QUICKER * latest
+            late = max(_LATE * budget.seconds, latest) if nearly() else _QUICKER * latest
             if left_off is not None and (another is None or budget.left < late):
                 begin, left_off = left_off, None
                 yield begin
@@ -97,6 +99,7 @@ def certified_map(
             budget=budget,
             patience=begin.patience,
             hasty=begin.hasty,
+            afar=left_off is None or not nearly(),
             resumed=begin.resumed,
             progress=progress,
         )

@@ -52,7 +52,9 @@ _WORTH = 0.8  # share for patches in which all edges are halved: mostly those do
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
-_MOST_HALVED = 0.2  # edges halved at once, per tet
+# Times the tets there were that halving may come to, and tets added for an edge: a coarse solid
+# needs them, where single vertices inside see hundreds of faces.
+_MOST_TETS, _PER_EDGE = 10, 6
 
 # Mean abs(ratio - 1) from which on more vertices are worth their time, and how often; the tets they
 # are for have so many times the mean energy.
@@ -68,6 +70,7 @@ class _Run:
     budget: Budget  # all of it
     on_mesh: bool = False  # whether the boundary is going to glide on one
     hasty: bool = False  # whether another start follows, worth more than tets that stay stuck
+    afar: bool = True  # whether tets far too many for patches are worth time, too
     resumed: bool = False  # whether this one had made room for others
     seconds: dict[str, float] = field(default_factory=dict)
 
@@ -104,6 +107,7 @@ def solve(
     budget: Budget | None = None,
     patience: float = 1.0,
     hasty: bool = False,
+    afar: bool = True,
     resumed: bool = False,
     progress: Progress | None = None,
 ) -> Outcome:
@@ -122,6 +126,8 @@ def solve(
         Share of it that untangling may take.
     hasty : bool
         Whether to end where tets stay stuck, as other starts follow.
+    afar : bool
+        Whether a hasty one goes on where far too many tets for patches are inverted.
     resumed : bool
         Whether the problem is one that ended so.
     progress : Progress, optional
@@ -131,7 +137,7 @@ def solve(
     problem = started(problem, solver=options.solver)
     history = History(problem.model(options), budget.share(patience), progress)
     on_mesh = glide and problem.ground is not None
-    run = _Run(problem, options, history, budget, on_mesh, hasty, resumed)
+    run = _Run(problem, options, history, budget, on_mesh, hasty, afar, resumed)
     run.seconds["start"] = time.perf_counter() - clock
     with run.timed("untangle"):
         left = _untangle(run, glide=glide and not on_mesh)
@@ -203,6 +209,7 @@ def _untangle(run: _Run, *, glide: bool) -> int:
         run.x = opened = untangle_whole(history.model, run.x, history, glide=True).x
         stuck = _patched(run, glide=True)
     best, fewest, least, edges = run.problem, stuck, _inverted(run), crowded_edges
+    most = _MOST_TETS * run.problem.solid.n_tets
     for _ in range(_ROUNDS):
         if not len(stuck) or run.problem.refinement is None or history.budget.spent:
             break
@@ -211,7 +218,7 @@ def _untangle(run: _Run, *, glide: bool) -> int:
         if not _inverted(run):
             break  # folded faces are left, which more vertices inside do not unfold
         halved = edges(run.problem.solid, stuck)
-        if len(halved) > _MOST_HALVED * run.problem.solid.n_tets:
+        if run.problem.solid.n_tets + _PER_EDGE * len(halved) > most:
             break
         run.take(run.problem.halved(halved))
         _log.info("%d inverted tets are stuck: %d edges round them halved", len(stuck), len(halved))
@@ -246,17 +253,22 @@ def _inverted(run: _Run) -> int:
 def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     """All tets, then patches, and where that does not do, both more thoroughly; tets left.
 
+    Where far too many tets are inverted for patches, all are begun with once more: in haste from
+    afar, then with more vertices.
+
     A boundary that is going to glide on a mesh gives way before that. On a torus all of it would
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
     history, begin = run.history, run.x
     if not run.resumed:  # else it has been at its end
         run.x = untangle_whole(history.model, begin, history, glide=False, hasty=run.hasty).x
-    if run.hasty and run.hopeless:
+    if run.hasty and run.afar and run.hopeless:
         near, inverted = run.x, _inverted(run)
         run.x = untangle_whole(history.model, begin, history, glide=False, from_afar=True).x
         if _inverted(run) >= inverted:
             run.x = near
+    if run.afar and run.hopeless:
+        _untangle_refined(run, begin)
     if run.hasty and run.hopeless:
         return stuck_tets(history.model, run.x, glide=False)
     many = _inverted(run)
@@ -286,6 +298,22 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         run.take(before)
         return stuck
     return _untangled_halved(run, left) if glide and len(left) else left
+
+
+def _untangle_refined(run: _Run, begin: NDArray[np.float64]) -> None:
+    """All tets with more vertices by the stuck ones; as they are, if far too many stay so.
+
+    Where the boundary has most of the vertices, the few inside have no place that suits all faces.
+    """
+    before, history = run.problem, run.history
+    if before.refinement is None:
+        return
+    edges = crowded_edges(before.solid, stuck_tets(history.model, run.x, glide=False))
+    run.take(dataclasses.replace(before, x=begin).halved(edges))
+    _log.info("%d edges halved, as far too many tets are stuck", len(edges))
+    run.x = untangle_whole(history.model, run.x, history, glide=False, hasty=True).x
+    if run.hopeless:
+        run.take(before)
 
 
 def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:

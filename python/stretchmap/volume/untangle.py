@@ -34,8 +34,9 @@ __all__ = [
 ]
 
 # Epsilon: determinants are 1 where all is well, a larger one tells nothing apart. But where some
-# are inverted to many times that, one of 1 hides all others behind them, and steps are short. Down
-# to the narrow one more tets turn over than had been inverted, which shows nothing.
+# are inverted to many times that, one of 1 hides all others behind them, and steps are short; in
+# patches, where nothing else turns over for it, it is as wide as they ask for. Down to the narrow
+# one more tets turn over than had been inverted, which shows nothing.
 _WIDEST, _WIDEST_FROM_AFAR, _NARROW = 1.0, 20.0, 0.1
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
@@ -113,17 +114,18 @@ def _continue(
     steps: int,
     enough: Callable[[int, int, float], bool],
     hasty: bool = False,
-    from_afar: bool = False,
+    widest: float = _WIDEST,
     linear: _core.volume.NewtonOptions,
     budget: Budget,
     note: Callable[[int, NDArray[np.float64], _core.volume.NewtonReport, float], None]
     | None = None,
 ) -> Untangled:
-    """Follow the worst determinant down with epsilon; ``enough(left, since, epsilon)`` ends it."""
+    """Follow the worst determinant down with epsilon, no wider than ``widest`` to begin with;
+    ``enough(left, since, epsilon)`` ends it."""
     state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
     left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
     # A better worst tet is not worth turning others over for long, nor many steps.
-    clean, widest = left == 0, _WIDEST_FROM_AFAR if from_afar else _WIDEST
+    clean, from_afar = left == 0, widest > _WIDEST
     steps = min(steps, _AWAY) if clean else steps
     epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), widest)
     patience = Patience(left, worst)
@@ -219,7 +221,7 @@ def untangle_whole(
         steps=o.untangle_iter,
         enough=lambda left, since, epsilon: since >= patience(left, epsilon),
         hasty=hasty,
-        from_afar=from_afar,
+        widest=_WIDEST_FROM_AFAR if from_afar else _WIDEST,
         linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
         budget=history.budget,
         note=note,
@@ -353,7 +355,7 @@ def untangle_patches(
             floor=o.floor,
             steps=_PATCH_STEPS,
             enough=lambda left, since, epsilon: since >= _PATCH_PATIENCE,
-            from_afar=True,
+            widest=math.inf,
             linear=_core.volume.NewtonOptions(tol=1e-2, max_cg=o.max_cg),
             budget=budget,
         )

@@ -55,6 +55,25 @@ def test_a_ball_is_mapped_to_a_cube(ball):
     assert result.torus is None and result.title == "fill"
 
 
+@pytest.mark.parametrize(
+    ("nu", "nv", "ratio", "turns"),
+    [(24, 10, 1.3, 1), (40, 12, 1.5, 2), (60, 12, 1.5, 2), (60, 20, 1.3, 1), (60, 20, 1.3, 2)],
+)
+def test_a_twisted_boundary_and_hardly_a_vertex_inside(nu, nv, ratio, turns):
+    """Single vertices that see hundreds of faces have no place: more are put in until there is."""
+    pytest.importorskip("tetgen")
+    surface = samples.torus_surface(nu, nv, R=ratio, r=1.0)
+    solid = samples.tetrahedralize(surface, quality=1e6)  # tets that reach right across
+    x, y, z = solid.surface.V.T
+    u, v = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y) - ratio)
+    w = v + turns * u
+    far = ratio + np.cos(w)
+    boundary = np.column_stack([far * np.cos(u), far * np.sin(u), np.sin(w)])
+    result = sm.fill(solid, boundary)
+    check(solid, boundary, result)
+    assert result.converged
+
+
 def test_a_boundary_that_moved_rigidly_moves_the_inside(ball):
     Q = np.linalg.qr(RNG.standard_normal((3, 3)))[0]
     Q *= np.sign(np.linalg.det(Q))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -33,12 +34,17 @@ class Found:
 
 
 def order(
-    monkeypatch: Any, stuck: dict[str, int], left: list[float], kept: int = 0, n_tets: int = 1000
+    monkeypatch: Any,
+    stuck: dict[str, int],
+    left: list[float],
+    kept: int = 0,
+    n_tets: int = 1000,
+    note: Callable[[dict[str, Any]], object] = id,
 ) -> list[str]:
     """Names of the starts as they are solved, in capitals where none is to make room.
 
     ``stuck`` says how many tets each leaves inverted in haste, ``kept`` how many if gone on with,
-    ``left`` what share of the time is left after each.
+    ``left`` what share of the time is left after each. ``note`` is told what else they are given.
     """
     solved: list[str] = []
     budget = SimpleNamespace(seconds=1.0, left=1.0)
@@ -48,7 +54,8 @@ def order(
             problem = SimpleNamespace(name=name, held=())
             yield Start(SimpleNamespace(), problem, hasty=True)
 
-    def solve(problem: Any, *_: Any, hasty: bool, **__: Any) -> Outcome:
+    def solve(problem: Any, *_: Any, hasty: bool, **given: Any) -> Outcome:
+        note(given)
         solved.append(problem.name if hasty else problem.name.upper())
         budget.left = left[len(solved) - 1]
         flips = stuck[problem.name] if hasty else kept
@@ -92,6 +99,23 @@ def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, 
 def test_of_many_tets_more_are_few(monkeypatch, n_tets, expected) -> None:
     found = order(monkeypatch, {"a": 60, "b": 90}, [0.45, 0.05], 0, n_tets)
     assert "".join(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("stuck", "expected"),
+    [
+        ({"a": 400, "b": 900, "c": 90}, [True, True, True]),
+        # Gone on with, a serves sooner than what far too many are stuck in.
+        ({"a": 4, "b": 900, "c": 90}, [True, False, False]),
+        ({"a": 400, "b": 4, "c": 90}, [True, True, False]),
+    ],
+)
+def test_hopeless_starts_are_worth_no_time_where_few_tets_are_stuck_in_another(
+    monkeypatch, stuck, expected
+) -> None:
+    afar: list[bool] = []
+    order(monkeypatch, stuck, [0.9, 0.8, 0.7, 0.6], note=lambda given: afar.append(given["afar"]))
+    assert afar == [*expected, True]  # what is gone on with is the last
 
 
 @pytest.mark.parametrize(("left", "expected"), [(1.0, 0.5), (0.55, 1.0)])
