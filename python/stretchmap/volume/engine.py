@@ -132,7 +132,7 @@ def solve(
         Whether the problem is one that ended so.
     progress : Progress, optional
     """
-    budget = budget or Budget.of(options.time_limit, problem.solid.n_tets)
+    budget = budget or Budget.of(options.time_limit, problem.n_given_tets)
     clock = time.perf_counter()
     problem = started(problem, solver=options.solver)
     history = History(problem.model(options), budget.share(patience), progress)
@@ -220,8 +220,7 @@ def _untangle(run: _Run, *, glide: bool) -> int:
         halved = edges(run.problem.solid, stuck)
         if run.problem.solid.n_tets + _PER_EDGE * len(halved) > most:
             break
-        run.take(run.problem.halved(halved))
-        _log.info("%d inverted tets are stuck: %d edges round them halved", len(stuck), len(halved))
+        _halve(run, halved, stuck)
         stuck = _patched(run, glide=glide)
         # Folded faces can be held, inverted tets cannot.
         inverted = _inverted(run)
@@ -271,17 +270,17 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
         _untangle_refined(run, begin)
     if run.hasty and run.hopeless:
         return stuck_tets(history.model, run.x, glide=False)
-    many = _inverted(run)
-    stuck = _patched(run, glide=False, few=_FEW_STUCK if glide else 0)
+    many, cheap = _inverted(run), not run.on_mesh  # more vertices are
+    stuck = _patched(run, glide=False, few=_FEW_STUCK if cheap else 0)
     if run.hasty and history.budget.spent and _FEW_STUCK < len(stuck) <= _CURED * many:
         history.budget = run.budget.share(_GOING_ON)
-        stuck = _patched(run, glide=False, few=_FEW_STUCK if glide else 0)
+        stuck = _patched(run, glide=False, few=_FEW_STUCK if cheap else 0)
     if glide and 0 < len(stuck) <= _FEW_STUCK:
         stuck = _patched_gliding(run, stuck)
-    if glide and 0 < len(stuck) <= _FEW_STUCK:
+    if cheap and 0 < len(stuck) <= _FEW_STUCK:
         more = run.budget.share(_NEARLY)
         history.budget = more if more.left > history.budget.left else history.budget
-        stuck = _untangled_halved(run, stuck)
+        stuck = _untangled_halved(run, stuck, glide=glide)
     early = run.budget.left > _EARLY * run.budget.seconds
     if run.hasty and early and glide and 0 < len(stuck) <= _FEW_STUCK:
         stuck = _patched_gliding(run, stuck, rings=_RINGS[-1:], share=_WIDELY)
@@ -297,7 +296,7 @@ def _untangle_inside(run: _Run, *, glide: bool) -> NDArray[np.intp]:
     if len(left) > len(stuck):
         run.take(before)
         return stuck
-    return _untangled_halved(run, left) if glide and len(left) else left
+    return _untangled_halved(run, left, glide=glide) if cheap and len(left) else left
 
 
 def _untangle_refined(run: _Run, begin: NDArray[np.float64]) -> None:
@@ -308,15 +307,20 @@ def _untangle_refined(run: _Run, begin: NDArray[np.float64]) -> None:
     before, history = run.problem, run.history
     if before.refinement is None:
         return
-    edges = crowded_edges(before.solid, stuck_tets(history.model, run.x, glide=False))
-    run.take(dataclasses.replace(before, x=begin).halved(edges))
-    _log.info("%d edges halved, as far too many tets are stuck", len(edges))
+    stuck = stuck_tets(history.model, run.x, glide=False)
+    run.x = begin
+    _halve(run, crowded_edges(before.solid, stuck), stuck)
     run.x = untangle_whole(history.model, run.x, history, glide=False, hasty=True).x
     if run.hopeless:
         run.take(before)
 
 
-def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
+def _halve(run: _Run, edges: NDArray[np.int32], stuck: NDArray[np.intp]) -> None:
+    run.take(run.problem.halved(edges))
+    _log.info("%d inverted tets are stuck: %d edges round them halved", len(stuck), len(edges))
+
+
+def _untangled_halved(run: _Run, stuck: NDArray[np.intp], *, glide: bool) -> NDArray[np.intp]:
     """Few stuck tets untangled with edges round them halved, or left as they are.
 
     First those by which they hang on the boundary. Where that breeds more than it cures, all in
@@ -330,7 +334,7 @@ def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
         if run.history.budget.spent:
             break
         last = run.problem
-        run.take(last.halved(edges(last.solid, left)))
+        _halve(run, edges(last.solid, left), left)
         if edges is crowded_edges:
             now = _patched(run, glide=False, few=_FEW_STUCK)
             if len(now) > len(left):
@@ -339,7 +343,10 @@ def _untangled_halved(run: _Run, stuck: NDArray[np.intp]) -> NDArray[np.intp]:
                 continue
         else:
             now = stuck_tets(run.history.model, run.x, glide=False)
-        left = _patched_gliding(run, now, rings=_NARROW, share=_WORTH) if len(now) else now
+        if not glide:
+            left = _patched(run, glide=False, rings=_NARROW)
+        else:
+            left = _patched_gliding(run, now, rings=_NARROW, share=_WORTH) if len(now) else now
     if not len(left):
         return left
     run.take(before)

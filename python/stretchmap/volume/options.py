@@ -43,8 +43,8 @@ class FillOptions:
         abs(ratio - 1) is above 0.05, also edges of the tets that keep their volume worst. False: a
         mesh of the first kind is refused, and no other gets vertices.
     time_limit : float
-        Processor time per tet, in seconds, after which no further stage is begun and a map with
-        inverted tets is given up; a small mesh gets some seconds all the same.
+        Processor time per tet of the solid given, in seconds, after which no further stage is begun
+        and a map with inverted tets is given up; a small mesh gets some seconds all the same.
     volume_weight : float
         Largest weight lambda of the volume term against the shape term.
     growth : float

@@ -142,6 +142,11 @@ class VolumeProblem:
             pinned=np.empty(0, np.intp) if pinned is None else pinned.astype(np.intp),
         )
 
+    @property
+    def n_given_tets(self) -> int:
+        """Tets of the solid before any were split."""
+        return self.solid.n_tets if self.refinement is None else self.refinement.n_given_tets
+
     def halved(self, edges: NDArray[np.int32]) -> VolumeProblem:
         """With interior edges (e, 2) of the solid halved, the longest first; in the image, too."""
         assert self.refinement is not None

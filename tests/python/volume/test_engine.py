@@ -124,11 +124,12 @@ def test_edges_that_surround_tets_are_all_those_of_vertices_inside_next_to_them(
         assert {tuple(e) for e in crowded_edges(solid, np.array(tets)).tolist()} <= set(found)
 
 
+@pytest.mark.parametrize("glide", [False, True])
 @pytest.mark.parametrize("breeds", [False, True])
-def test_where_halving_breeds_stuck_tets_all_round_them_is_halved_instead(monkeypatch, breeds):
+def test_where_halving_breeds_stuck_tets_all_round_is_halved_instead(monkeypatch, breeds, glide):
     """One stuck tet: of three with edges to the boundary halved, none with all those near it."""
     asked: list[str] = []
-    state = {"halved": ""}
+    state, may_glide = {"halved": ""}, glide
 
     class Problem:
         refinement, solid = object(), None
@@ -143,7 +144,8 @@ def test_where_halving_breeds_stuck_tets_all_round_them_is_halved_instead(monkey
     def some(name):
         return lambda solid, tets: asked.append(name) or name
 
-    def left(*_, **__):
+    def left(*_, glide=True, **__):
+        assert not glide or may_glide
         state["halved"], now = "", state["halved"]
         if now == "crowded":
             return np.arange(3 if breeds else 0)
@@ -158,6 +160,6 @@ def test_where_halving_breeds_stuck_tets_all_round_them_is_halved_instead(monkey
     monkeypatch.setattr(engine, "surrounding_edges", some("surrounding"))
     for name in ("_patched", "_patched_gliding", "stuck_tets"):
         monkeypatch.setattr(engine, name, left)
-    assert not len(engine._untangled_halved(run, np.arange(1)))
+    assert not len(engine._untangled_halved(run, np.arange(1), glide=glide))
     assert asked == ["crowded", "surrounding"][: 1 + breeds]
     assert run.problem is not given

@@ -217,8 +217,9 @@ def test_few_folded_faces_are_unfolded_with_what_is_round_them(monkeypatch, fold
     assert done == (["patches", "whole", "patches"] if folded else ["patches", "whole"])
 
 
+@pytest.mark.parametrize("glide", [True, False])
 @pytest.mark.parametrize(("stuck", "cured"), [(3, True), (3, False), (200, False)])
-def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuck, cured):
+def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuck, cured, glide):
     run = run_of(sm.samples.bumpy_torus(6000), patience=0.1)
     begun, done = run.problem.solid, []
     inner = np.setdiff1d(np.arange(begun.n_vertices), begun.boundary_vertices)
@@ -241,7 +242,7 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
     monkeypatch.setattr(engine, "_patched", patched)
     monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: patched(run, glide=False))
     monkeypatch.setattr(engine, "untangle_whole", whole)
-    left = engine._untangle_inside(run, glide=True)
+    left = engine._untangle_inside(run, glide=glide)
     assert len(left) == (0 if cured else stuck)
     assert done == (["whole"] if cured else ["whole", "thorough"])
     assert halved() == cured
@@ -344,7 +345,7 @@ def test_some_stuck_tets_are_worth_a_gliding_boundary_before_another_start(
 
     monkeypatch.setattr(engine, "_patched", patched)
     monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: np.arange(stuck))
-    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck: stuck)
+    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck, glide: stuck)
     assert len(engine._untangle_inside(run, glide=True)) == stuck
     assert gliding == ([(), (8,)] if tried else [])
 
@@ -362,7 +363,7 @@ def test_what_patches_were_curing_when_time_was_up_is_gone_on_with(monkeypatch, 
         return np.arange(left)
 
     monkeypatch.setattr(engine, "_patched", patched)
-    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck: stuck)
+    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck, glide: stuck)
     assert len(engine._untangle_inside(run, glide=True)) == left
     assert len(seconds) == rounds and seconds[0] == 0.0
     assert rounds == 1 or seconds[1] == pytest.approx(0.4 * run.budget.left, rel=0.1)
