@@ -58,7 +58,7 @@ _MOST_TETS, _PER_EDGE = 10, 6
 
 # Mean abs(ratio - 1) from which on more vertices are worth their time, and how often; the tets they
 # are for have so many times the mean energy.
-_UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 2, 3.0
+_UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, 3.0
 _FINER = 0.7  # share of the time left that this may take
 
 

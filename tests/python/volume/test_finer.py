@@ -79,6 +79,16 @@ def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
     assert n_finer < 1.25 * n_coarse
 
 
+def test_rounds_go_on_while_volumes_are_kept_badly(monkeypatch):
+    solids = [plate(*shape) for shape in ((8, 3, 3), (9, 5, 3))]
+    all_rounds = [sm.volume_map(each) for each in solids]
+    monkeypatch.setattr(engine, "_FINER_ROUNDS", 2)
+    two_rounds = [sm.volume_map(each) for each in solids]
+    assert all(result.converged for result in all_rounds)
+    left, before = (sum(map(unevenness, made, solids)) for made in (all_rounds, two_rounds))
+    assert left < 0.93 * before
+
+
 def test_what_keeps_volumes_well_is_left_as_it_is(solid, monkeypatch):
     monkeypatch.setattr(engine, "_UNEVEN", 0.2)
     assert not sm.volume_map(solid).refinement.halved
