@@ -6,6 +6,7 @@
 #include "stretchmap/area/coarsen.hpp"
 #include "stretchmap/area/edge_sags.hpp"
 #include "stretchmap/area/phase_energies.hpp"
+#include "stretchmap/area/straight_drawing.hpp"
 #include "stretchmap/area/surface_newton.hpp"
 #include "stretchmap/area/surface_reference.hpp"
 #include "stretchmap/area/surface_sem.hpp"
@@ -25,6 +26,8 @@ void bind_chart(py::module_& m) {
       .def_readonly("shift_u", &SurfaceChart::shift_u)
       .def_readonly("shift_v", &SurfaceChart::shift_v);
   m.def("turn_areas", &turn_areas, py::arg("chart"), py::arg("turns").noconvert(), release_gil());
+  m.def("straight_drawing", &straight_drawing, py::arg("faces").noconvert(), py::arg("n"),
+        py::arg("corners"), release_gil());
   m.def("edge_sags", &edge_sags, py::arg("topology"), py::arg("chart"),
         py::arg("areas").noconvert(), py::arg("angles").noconvert(), py::arg("ratio"),
         release_gil());

@@ -1,9 +1,10 @@
 from __future__ import annotations
+import collections.abc
 import numpy
 import numpy.typing
 import stretchmap._core.mesh
 import typing
-__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'coarsen', 'edge_sags', 'phase_energies', 'prolong', 'turn_areas']
+__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'coarsen', 'edge_sags', 'phase_energies', 'prolong', 'straight_drawing', 'turn_areas']
 class SurfaceChart:
     def __init__(self, topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]) -> None:
         ...
@@ -132,6 +133,8 @@ def edge_sags(topology: stretchmap._core.mesh.SurfaceTopology, chart: SurfaceCha
 def phase_energies(reference: SurfaceReference, faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], candidates: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...
 def prolong(coarse: CoarseSurface, chart: SurfaceChart, turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+    ...
+def straight_drawing(faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], n: typing.SupportsInt | typing.SupportsIndex, corners: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
     ...
 def turn_areas(chart: SurfaceChart, turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     ...

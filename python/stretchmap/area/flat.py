@@ -32,25 +32,43 @@ def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.floa
     """The conformal map's turns or, if it has folds, those of a map that has none.
 
     Positive weights embed the surface in a flat torus whatever its triangles (Tutte), but for
-    limbs whose tips are lost in rounding. Those are spread, or else weights fall along them.
+    limbs whose tips are lost in rounding. Those are spread, or else weights fall along them, or
+    else they are drawn.
     """
     chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
     if (_core.area.turn_areas(chart, conformal.turns) > 0.0).all():
         return conformal.turns
     forms = conformal.forms.astype(float)
-    turns, before = _embedded(surface, np.ones(len(surface.edges)), forms), None
-    while turns is not before:
-        if (_core.area.turn_areas(chart, turns) > _LEAST_AREA).all():
-            return turns
-        before = turns
-        turns = spread_limbs(surface, chart, turns, forms, conformal.aspect, _LEAST_AREA)
-    return _weighted_turns(surface, chart, forms)
+    embedded = _embedded(surface, np.ones(len(surface.edges)), forms)
+
+    def spread(drawn: bool) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        turns, before = embedded, None
+        while True:
+            lost = np.flatnonzero(~(_core.area.turn_areas(chart, turns) > _LEAST_AREA))
+            if not len(lost) or turns is before:
+                return turns, lost
+            before = turns
+            turns = spread_limbs(
+                surface, chart, turns, forms, conformal.aspect, _LEAST_AREA, drawn=drawn
+            )
+
+    turns, lost = spread(False)
+    if len(lost):
+        weighted = _weighted_turns(surface, chart, forms)
+        turns, lost = spread(True) if weighted is None else (weighted, lost[:0])
+    if len(lost):
+        raise SolverError(
+            f"{describe('face', lost)} lie so far out on a long, thin limb that a flat map "
+            "shrinks them to nothing: cut the limb short or remesh it coarser",
+            lost,
+        )
+    return turns
 
 
 def _weighted_turns(
     surface: TriMesh, chart: _core.area.SurfaceChart, forms: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Turns by weights that fall along limbs.
+) -> NDArray[np.float64] | None:
+    """Turns by weights that fall along limbs, None if faces are lost all the same.
 
     Where weights fall by exp(-a) with every radius outward, sizes fall by
     exp((a - sqrt(a^2 + 4)) / 2) only, nearly exp(-1 / a), instead of by e.
@@ -74,12 +92,7 @@ def _weighted_turns(
         areas = _core.area.turn_areas(chart, turns)
         if (areas > _LEAST_AREA).all():
             return turns
-    folded = np.flatnonzero(~(areas > _LEAST_AREA))
-    raise SolverError(
-        f"{describe('face', folded)} lie so far out on a long, thin limb that a flat map "
-        "shrinks them to nothing: cut the limb short or remesh it coarser",
-        folded,
-    )
+    return None
 
 
 def _embedded(

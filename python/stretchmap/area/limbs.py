@@ -38,6 +38,8 @@ def spread_limbs(
     forms: _Floats,
     aspect: float,
     least: float,
+    *,
+    drawn: bool = False,
 ) -> _Floats:
     """Turns (n, 2) with limbs spread that hold lost faces, fewer than before, or as they were.
 
@@ -57,6 +59,10 @@ def spread_limbs(
         Of the flat torus.
     least : float
         Area of a face in the chart that is not lost.
+    drawn : bool
+        Whether limbs with three edges round them are drawn instead, straight (Schnyder): behind
+        such a neck sizes fall by a factor with every ring whatever the weights. All faces have room
+        then, and that is all there is to be said for it.
     """
     areas = _core.area.turn_areas(chart, turns)
     lost, share = ~(areas > least), surface.face_areas / surface.face_areas.sum()
@@ -64,9 +70,13 @@ def spread_limbs(
     for small in _SMALL:
         other = turns.copy()
         for faces in _limbs(surface, ~(areas > small * share), lost):
-            spread = _spread(surface, faces, turns, forms, aspect)
-            if spread is not None:
-                other[spread[0]] = spread[1]
+            limb = _Limb.of(surface, faces, forms)
+            at = None
+            if limb is not None:
+                at = _drawn(limb, turns) if drawn else None
+                at = _spread(surface, limb, turns, aspect) if at is None else at
+            if limb is not None and at is not None:
+                other[limb.vertices] = at
         left = int((~(_core.area.turn_areas(chart, other) > least)).sum())
         if left < fewest:
             best, fewest = other, left
@@ -164,13 +174,19 @@ def _summed(ends: _Ints, steps: _Floats, n: int) -> _Floats:
     return values
 
 
-def _spread(
-    surface: TriMesh, faces: _Ints, turns: _Floats, forms: _Floats, aspect: float
-) -> tuple[_Ints, _Floats] | None:
-    """Vertices of a limb and their turns, None if it cannot be spread."""
-    limb = _Limb.of(surface, faces, forms)
-    if limb is None:
+def _drawn(limb: _Limb, turns: _Floats) -> _Floats | None:
+    """Turns of a limb's vertices, None if not three of them are at its rim."""
+    _, _, i, j = limb.rim()
+    if len(i) != 3:
         return None
+    corners = [i[0], j[0], j[i == j[0]][0]]
+    shares = _core.area.straight_drawing(limb.F.astype(np.int32), len(limb.vertices), corners)
+    at: _Floats = shares @ (turns[limb.vertices] + limb.offsets)[corners] - limb.offsets
+    return at
+
+
+def _spread(surface: TriMesh, limb: _Limb, turns: _Floats, aspect: float) -> _Floats | None:
+    """Turns of a limb's vertices, None if it cannot be spread."""
     shape = np.array([aspect, 1.0])
     at = (turns[limb.vertices] + limb.offsets) * shape
     face, corner, i, j = limb.rim()
@@ -189,7 +205,8 @@ def _spread(
     if spread is None:
         return None
     flat = np.column_stack([spread.real, spread.imag]) + center
-    return limb.vertices, flat / shape - limb.offsets
+    places: _Floats = flat / shape - limb.offsets
+    return places
 
 
 def _tip(limb: _Limb, V: _Floats, rim: _Ints) -> int:
