@@ -68,7 +68,7 @@ def job_of(case: Case, out: Path) -> dict[str, Any]:
     return {
         "kind": "fill", "group": case.group, "name": case.name, "seed": None, "size": 1.0,
         "mesh": str(case.path), "record": f"{stem}.json", "map": f"{stem}_map.npz",
-        "per_element": 2e-3,
+        "per_element": 1e-3,
     }  # fmt: skip
 
 
