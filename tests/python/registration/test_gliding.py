@@ -10,7 +10,7 @@ import pytest
 import stretchmap as sm
 from stretchmap import _core, samples
 from stretchmap.errors import KindError, OptionError
-from stretchmap.volume import engine, ground
+from stretchmap.volume import engine, ground, untangle_order
 from stretchmap.volume.options import FillOptions
 from stretchmap.volume.problem import VolumeProblem
 from stretchmap.volume.untangle import stuck_tets, untangle_patches
@@ -179,13 +179,13 @@ def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps, monke
     assert ground.untangle_on_mesh(still, options, history) is None
 
     # Where the boundary is going to glide, that comes before anything thorough.
-    thorough, whole = [], engine.untangle_whole
+    thorough, whole = [], untangle_order.untangle_whole
 
     def counted(*given, **more):
         thorough.append(more.get("thorough", False))
         return whole(*given, **more)
 
-    monkeypatch.setattr(engine, "untangle_whole", counted)
+    monkeypatch.setattr(untangle_order, "untangle_whole", counted)
     outcome = engine.solve(problem, options, glide=True)
     assert sm.certify(held.mesh, outcome.problem.x).certified
     assert thorough and not any(thorough)

@@ -11,7 +11,7 @@ import pytest
 from stretchmap import _core, samples
 from stretchmap.base.budget import Budget
 from stretchmap.mesh.refinement import crowded_edges, refine_overconstrained, surrounding_edges
-from stretchmap.volume import engine
+from stretchmap.volume import untangle_order
 from stretchmap.volume.engine import solve
 from stretchmap.volume.options import FillOptions
 from stretchmap.volume.problem import VolumeProblem
@@ -156,10 +156,10 @@ def test_where_halving_breeds_stuck_tets_all_round_is_halved_instead(monkeypatch
         history=SimpleNamespace(budget=Budget(9.0), model=None),
     )  # fmt: skip
     given = run.problem
-    monkeypatch.setattr(engine, "crowded_edges", some("crowded"))
-    monkeypatch.setattr(engine, "surrounding_edges", some("surrounding"))
+    monkeypatch.setattr(untangle_order, "crowded_edges", some("crowded"))
+    monkeypatch.setattr(untangle_order, "surrounding_edges", some("surrounding"))
     for name in ("_patched", "_patched_gliding", "stuck_tets"):
-        monkeypatch.setattr(engine, name, left)
-    assert not len(engine._untangled_halved(run, np.arange(1), glide=glide))
+        monkeypatch.setattr(untangle_order, name, left)
+    assert not len(untangle_order._untangled_halved(run, np.arange(1), glide=glide))
     assert asked == ["crowded", "surrounding"][: 1 + breeds]
     assert run.problem is not given

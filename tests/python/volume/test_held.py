@@ -15,12 +15,13 @@ from stretchmap.area.map import finished, turned
 from stretchmap.base.budget import Budget
 from stretchmap.errors import DegenerateError
 from stretchmap.volume import boundary_starts as boundary_starts_module
-from stretchmap.volume import certified, engine
+from stretchmap.volume import certified, engine, untangle_order
 from stretchmap.volume.boundary_starts import boundary_starts
 from stretchmap.volume.minimize import minimize
 from stretchmap.volume.model import GLIDING, History
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import VolumeProblem
+from stretchmap.volume.run import Run
 from stretchmap.volume.start import started
 from stretchmap.volume.untangle import untangle_whole
 
@@ -188,7 +189,7 @@ def solved_after_holding(problem, monkeypatch):
         run.take(dataclasses.replace(run.problem, held=held))
         return 0
 
-    monkeypatch.setattr(engine, "_untangle", untangled)
+    monkeypatch.setattr(engine, "untangle", untangled)
     return engine.solve(problem, VolumeOptions(), glide=True, budget=Budget(600.0), patience=1e-6)
 
 
@@ -198,7 +199,7 @@ def test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monk
 
 
 def test_one_that_cannot_be_released_is_gone_on_with_all_the_same(problem, monkeypatch):
-    monkeypatch.setattr(engine, "_release", lambda run: False)
+    monkeypatch.setattr(engine, "release", lambda run: False)
     outcome = solved_after_holding(problem, monkeypatch)
     assert len(outcome.problem.held) == 9
     assert not outcome.converged and outcome.stop_reason == "9 vertices of folded faces are held"
@@ -207,13 +208,13 @@ def test_one_that_cannot_be_released_is_gone_on_with_all_the_same(problem, monke
 def test_what_gliding_has_untangled_is_not_untangled_once_more(problem, monkeypatch):
     """Nor is a map that stays short of the floor, which the second time would search in vain."""
     called = []
-    untangle = engine.untangle_whole
+    untangle = untangle_order.untangle_whole
 
     def counted(*arguments, glide, **keywords):
         called.append(glide)
         return untangle(*arguments, glide=glide, **keywords)
 
-    monkeypatch.setattr(engine, "untangle_whole", counted)
+    monkeypatch.setattr(untangle_order, "untangle_whole", counted)
     options = VolumeOptions(floor=0.9)
     assert engine.solve(problem, options, glide=True, budget=Budget(600.0)).converged
     assert called == [False, True]
@@ -223,16 +224,16 @@ def test_folded_faces_are_better_than_inverted_tets(problem, monkeypatch):
     """Halving cures the one inverted tet at the price of more folded faces, which can be held."""
     budget = Budget(60.0)
     history = History(problem.model(VolumeOptions()), budget)
-    run = engine._Run(problem, VolumeOptions(), history, budget)
+    run = Run(problem, VolumeOptions(), history, budget)
     n, held = problem.solid.n_vertices, []
     halved = lambda run: run.problem.solid.n_vertices > n  # noqa: E731
-    monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(3))
+    monkeypatch.setattr(untangle_order, "_untangle_inside", lambda run, glide: np.arange(3))
     monkeypatch.setattr(
-        engine, "_patched", lambda run, glide: np.arange(5) if halved(run) else np.arange(3)
+        untangle_order, "_patched", lambda run, glide: np.arange(5) if halved(run) else np.arange(3)
     )
-    monkeypatch.setattr(engine, "_inverted", lambda run: 0 if halved(run) else 1)
-    monkeypatch.setattr(engine, "_hold_folded", lambda run: held.append(halved(run)))
-    assert engine._untangle(run, glide=True) == 0
+    monkeypatch.setattr(untangle_order, "_inverted", lambda run: 0 if halved(run) else 1)
+    monkeypatch.setattr(untangle_order, "_hold_folded", lambda run: held.append(halved(run)))
+    assert untangle_order.untangle(run, glide=True) == 0
     assert held == [True]
 
 
@@ -319,7 +320,7 @@ def test_a_wall_of_one_cell_is_mapped_from_shapes_kept_though_some_faces_fold():
 
 def test_what_untangling_kept_is_dropped_before_steps_begin(monkeypatch):
     solid, kept, given_back = sm.samples.bumpy_torus(1500), [], []
-    minimized, whole = engine._minimize, engine.untangle_whole
+    minimized, whole = engine._minimize, untangle_order.untangle_whole
 
     def untangled(model, *arguments, **keywords):
         found = whole(model, *arguments, **keywords)
@@ -331,7 +332,7 @@ def test_what_untangling_kept_is_dropped_before_steps_begin(monkeypatch):
         assert not [name for name in vars(run.history.model) if name.startswith("roomy")]
         return minimized(run, **keywords)
 
-    monkeypatch.setattr(engine, "untangle_whole", untangled)
+    monkeypatch.setattr(untangle_order, "untangle_whole", untangled)
     monkeypatch.setattr(engine, "_minimize", watched)
     monkeypatch.setattr(engine._core.base, "give_free_memory_back", lambda: given_back.append(1))
     assert sm.volume_map(solid).certificate.certified and len(given_back) == 2

@@ -9,11 +9,13 @@ import pytest
 
 import stretchmap as sm
 from stretchmap.base.budget import Budget
-from stretchmap.volume import engine, untangle
+from stretchmap.volume import untangle
+from stretchmap.volume import untangle_order as order
 from stretchmap.volume.glide_relax import Relaxation
 from stretchmap.volume.model import History
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import VolumeProblem
+from stretchmap.volume.run import Run
 from stretchmap.volume.start import started
 from stretchmap.volume.untangle import Untangled, _continue
 
@@ -121,11 +123,11 @@ def test_what_is_hopeless_near_by_is_begun_once_more(monkeypatch, better, hasty,
         done.append("afar" if from_afar else "more" if len(x) > len(begin) else "near")
         return Untangled(np.full(x.shape, 2.0 if done[-1] == better else 1.0), 0, -1.0)
 
-    monkeypatch.setattr(engine, "untangle_whole", whole)
+    monkeypatch.setattr(order, "untangle_whole", whole)
     monkeypatch.setattr(
-        engine, "stuck_tets", lambda model, x, glide: np.arange(0 if x[0, 0] == 2.0 else n)
+        order, "stuck_tets", lambda model, x, glide: np.arange(0 if x[0, 0] == 2.0 else n)
     )
-    left = engine._untangle_inside(run, glide=True)
+    left = order._untangle_inside(run, glide=True)
     tried = ["afar"] * hasty + ["more"] if afar else []
     tried = tried[: tried.index(better) + 1] if better in tried else tried
     assert done == ["near", *tried]
@@ -189,12 +191,12 @@ def test_a_better_worst_tet_is_worth_a_few_steps():
     assert len(newton.epsilons) == 6 and found.worst == pytest.approx(1e-4 * 1.1**6)
 
 
-def run_of(solid: sm.TetMesh, seconds: float = 60.0, patience: float = 1.0) -> engine._Run:
+def run_of(solid: sm.TetMesh, seconds: float = 60.0, patience: float = 1.0) -> Run:
     plain = sm.area_map(solid.surface, finish="none")
     problem = started(VolumeProblem.of(solid, plain.image, torus=plain.torus), solver="auto")
     budget = Budget(seconds)
     history = History(problem.model(VolumeOptions()), budget.share(patience))
-    return engine._Run(problem, VolumeOptions(), history, budget)
+    return Run(problem, VolumeOptions(), history, budget)
 
 
 @pytest.mark.parametrize("folded", [0, 5])
@@ -210,10 +212,10 @@ def test_few_folded_faces_are_unfolded_with_what_is_round_them(monkeypatch, fold
         done.append("whole")
         return Untangled(x, 0, 1.0)
 
-    monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(0))
-    monkeypatch.setattr(engine, "_patched", patched)
-    monkeypatch.setattr(engine, "untangle_whole", whole)
-    assert engine._untangle(run, glide=True) == 0
+    monkeypatch.setattr(order, "_untangle_inside", lambda run, glide: np.arange(0))
+    monkeypatch.setattr(order, "_patched", patched)
+    monkeypatch.setattr(order, "untangle_whole", whole)
+    assert order.untangle(run, glide=True) == 0
     assert done == (["patches", "whole", "patches"] if folded else ["patches", "whole"])
 
 
@@ -225,7 +227,7 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
     inner = np.setdiff1d(np.arange(begun.n_vertices), begun.boundary_vertices)
     ends = begun.T[(begun.T == inner[0]).any(axis=1)][0]
     edge = np.sort([inner[0], ends[ends != inner[0]][0]]).astype(np.int32)
-    monkeypatch.setattr(engine, "crowded_edges", lambda *_: edge[None])
+    monkeypatch.setattr(order, "crowded_edges", lambda *_: edge[None])
 
     def halved():
         return run.problem.solid.n_vertices > begun.n_vertices
@@ -239,10 +241,10 @@ def test_few_stuck_tets_get_more_vertices_before_anything_else(monkeypatch, stuc
         done.append("thorough" if thorough else "whole")
         return Untangled(x, stuck, -1.0)
 
-    monkeypatch.setattr(engine, "_patched", patched)
-    monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: patched(run, glide=False))
-    monkeypatch.setattr(engine, "untangle_whole", whole)
-    left = engine._untangle_inside(run, glide=glide)
+    monkeypatch.setattr(order, "_patched", patched)
+    monkeypatch.setattr(order, "stuck_tets", lambda *_, **__: patched(run, glide=False))
+    monkeypatch.setattr(order, "untangle_whole", whole)
+    left = order._untangle_inside(run, glide=glide)
     assert len(left) == (0 if cured else stuck)
     assert done == (["whole"] if cured else ["whole", "thorough"])
     assert halved() == cured
@@ -282,17 +284,17 @@ def test_a_start_gone_on_with_begins_with_patches(monkeypatch, resumed):
         done.append("patches")
         return np.arange(300)
 
-    monkeypatch.setattr(engine, "untangle_whole", whole)
-    monkeypatch.setattr(engine, "_patched", patched)
-    engine._untangle_inside(run, glide=True)
+    monkeypatch.setattr(order, "untangle_whole", whole)
+    monkeypatch.setattr(order, "_patched", patched)
+    order._untangle_inside(run, glide=True)
     assert done == [*([] if resumed else ["whole"]), "patches", "thorough", "patches"]
 
 
 @pytest.mark.parametrize(("share", "hopeless"), [(0.045, False), (0.055, True)])
 def test_with_more_than_a_twentieth_inverted_another_start_is_better(monkeypatch, share, hopeless):
     run = run_of(sm.samples.bumpy_torus(600))
-    monkeypatch.setattr(engine, "_inverted", lambda run: int(share * run.problem.solid.n_tets))
-    assert run.hopeless == hopeless
+    monkeypatch.setattr(order, "_inverted", lambda run: int(share * run.problem.solid.n_tets))
+    assert order._hopeless(run) == hopeless
 
 
 @pytest.mark.parametrize("left", [30, 110, 130])
@@ -336,17 +338,17 @@ def test_some_stuck_tets_are_worth_a_gliding_boundary_before_another_start(
 ):
     run = run_of(sm.samples.bumpy_torus(600))
     run.hasty, gliding = True, []
-    monkeypatch.setattr(engine, "untangle_whole", lambda _, x, *a, **k: Untangled(x, stuck, -1.0))
-    monkeypatch.setattr(engine, "_inverted", lambda run: 0)
+    monkeypatch.setattr(order, "untangle_whole", lambda _, x, *a, **k: Untangled(x, stuck, -1.0))
+    monkeypatch.setattr(order, "_inverted", lambda run: 0)
 
     def patched(run, *, glide, few=0, rings=()):
         gliding.extend([rings] if glide else [])
         return np.arange(stuck)
 
-    monkeypatch.setattr(engine, "_patched", patched)
-    monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: np.arange(stuck))
-    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck, glide: stuck)
-    assert len(engine._untangle_inside(run, glide=True)) == stuck
+    monkeypatch.setattr(order, "_patched", patched)
+    monkeypatch.setattr(order, "stuck_tets", lambda *_, **__: np.arange(stuck))
+    monkeypatch.setattr(order, "_untangled_halved", lambda run, stuck, glide: stuck)
+    assert len(order._untangle_inside(run, glide=True)) == stuck
     assert gliding == ([(), (8,)] if tried else [])
 
 
@@ -354,17 +356,17 @@ def test_some_stuck_tets_are_worth_a_gliding_boundary_before_another_start(
 def test_what_patches_were_curing_when_time_was_up_is_gone_on_with(monkeypatch, left, rounds):
     run = run_of(sm.samples.bumpy_torus(6000))
     run.hasty, run.history.budget, seconds = True, Budget(0.0), []
-    monkeypatch.setattr(engine, "untangle_whole", lambda _, x, *a, **k: Untangled(x, 1000, -1.0))
-    monkeypatch.setattr(engine, "_inverted", lambda run: 200)
+    monkeypatch.setattr(order, "untangle_whole", lambda _, x, *a, **k: Untangled(x, 1000, -1.0))
+    monkeypatch.setattr(order, "_inverted", lambda run: 200)
 
     def patched(run, *, glide, few=0, rings=()):
         if not glide:
             seconds.append(run.history.budget.left)
         return np.arange(left)
 
-    monkeypatch.setattr(engine, "_patched", patched)
-    monkeypatch.setattr(engine, "_untangled_halved", lambda run, stuck, glide: stuck)
-    assert len(engine._untangle_inside(run, glide=True)) == left
+    monkeypatch.setattr(order, "_patched", patched)
+    monkeypatch.setattr(order, "_untangled_halved", lambda run, stuck, glide: stuck)
+    assert len(order._untangle_inside(run, glide=True)) == left
     assert len(seconds) == rounds and seconds[0] == 0.0
     assert rounds == 1 or seconds[1] == pytest.approx(0.4 * run.budget.left, rel=0.1)
 
@@ -391,21 +393,21 @@ def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck
         done.append("gliding" if glide else "patches")
         return np.arange(stuck)
 
-    monkeypatch.setattr(engine, "untangle_whole", whole)
-    monkeypatch.setattr(engine, "_patched", patched)
-    monkeypatch.setattr(engine, "_inverted", lambda run: len(run.problem.solid.T) * hopeless)
-    monkeypatch.setattr(engine, "stuck_tets", lambda *_, **__: np.arange(stuck))
+    monkeypatch.setattr(order, "untangle_whole", whole)
+    monkeypatch.setattr(order, "_patched", patched)
+    monkeypatch.setattr(order, "_inverted", lambda run: len(run.problem.solid.T) * hopeless)
+    monkeypatch.setattr(order, "stuck_tets", lambda *_, **__: np.arange(stuck))
     edge = np.sort(run.problem.solid.T[:1, :2]).astype(np.int32)
-    monkeypatch.setattr(engine, "crowded_edges", lambda *_: edge)
+    monkeypatch.setattr(order, "crowded_edges", lambda *_: edge)
     monkeypatch.setattr(type(run.problem), "halved", lambda problem, edges: problem)
-    assert len(engine._untangle_inside(run, glide=True)) == stuck
+    assert len(order._untangle_inside(run, glide=True)) == stuck
     # Of few the boundary round them may glide, and they get more vertices, but not for as long as
     # another start may take. Where it is hopeless all are begun with once more, with more vertices.
     few = [*(4 * ["patches", "gliding"]), "gliding"]  # once more, wide, while it is early
     more = ["whole"] if hopeless else ["patches"] if stuck == 300 else few
     assert done == ["whole", *more]
-    monkeypatch.setattr(engine, "_untangle_inside", lambda run, glide: np.arange(stuck))
-    assert engine._untangle(run, glide=True) == stuck  # nothing else is tried either
+    monkeypatch.setattr(order, "_untangle_inside", lambda run, glide: np.arange(stuck))
+    assert order.untangle(run, glide=True) == stuck  # nothing else is tried either
     assert done == ["whole", *more]
 
 
@@ -419,9 +421,9 @@ def test_the_boundary_gives_way_round_few_stuck_tets_if_that_helps(monkeypatch, 
         run.x = run.x + 1.0
         return np.arange(left)
 
-    monkeypatch.setattr(engine, "_patched", patched)
-    monkeypatch.setattr(engine, "stuck_tets", lambda *_, glide: np.arange(99 if glide else left))
-    assert len(engine._patched_gliding(run, np.arange(2))) == min(left, 2)
+    monkeypatch.setattr(order, "_patched", patched)
+    monkeypatch.setattr(order, "stuck_tets", lambda *_, glide: np.arange(99 if glide else left))
+    assert len(order._patched_gliding(run, np.arange(2))) == min(left, 2)
     assert (run.x is not before) == kept
 
 
@@ -437,20 +439,20 @@ def test_patches_reach_further_where_they_hardly_help(monkeypatch, left, rings):
         found = {200: left, 150: 100, 100: 60, 60: 58, 58: 57, 57: 56}[int(x[0, 0])]
         return np.full(x.shape, float(found))
 
-    monkeypatch.setattr(engine, "untangle_patches", patches)
-    monkeypatch.setattr(engine, "stuck_tets", lambda model, x, glide: np.arange(int(x[0, 0])))
-    assert len(engine._patched(run, glide=False)) == (200 if left == 200 else 56)
+    monkeypatch.setattr(order, "untangle_patches", patches)
+    monkeypatch.setattr(order, "stuck_tets", lambda model, x, glide: np.arange(int(x[0, 0])))
+    assert len(order._patched(run, glide=False)) == (200 if left == 200 else 56)
     assert reached == rings
     for few, rest in ((55, rings), (200, [two for two in rings if two == 2])):
         reached.clear()
         run.x = np.full(run.x.shape, 200.0)
-        engine._patched(run, glide=False, few=few)  # so few are for the boundary to let go
+        order._patched(run, glide=False, few=few)  # so few are for the boundary to let go
         assert reached == rest
     reached.clear()
     run.x, run.hasty = np.full(run.x.shape, 200.0), True
-    engine._patched(run, glide=False)
+    order._patched(run, glide=False)
     assert reached == [two for two in rings if two == 2]
     reached.clear()
     run.x = np.full(run.x.shape, 200.0)
-    engine._patched(run, glide=False, rings=(8,))
+    order._patched(run, glide=False, rings=(8,))
     assert reached == [8] * (1 if left == 200 else 4)
