@@ -168,7 +168,8 @@ Points straight_drawing(const FacesRef& faces, Index n, const std::array<Index, 
   for (const Index v : trees.order) {
     for (int region = 0; region < 3; ++region) {
       const int one = (region + 1) % 3, other = (region + 2) % 3;
-      // The corners at the ends of both paths count as one each; by Euler's formula
+      // Those in the region and at its rim hang on the paths round it in its own tree, v on both;
+      // the corners at their ends hang on nothing. How many faces that makes, says Euler's formula.
       const std::int64_t vertices =
           along[one](v, region) + along[other](v, region) + 2 - hanging(v, region);
       const std::int64_t at_rim = depth(v, one) + depth(v, other) + 1;

@@ -41,26 +41,27 @@ def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.floa
     forms = conformal.forms.astype(float)
     embedded = _embedded(surface, np.ones(len(surface.edges)), forms)
 
-    def spread(drawn: bool) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    def lost(turns: NDArray[np.float64]) -> NDArray[np.intp]:
+        return np.flatnonzero(~(_core.area.turn_areas(chart, turns) > _LEAST_AREA))
+
+    def spread(*, drawn: bool) -> NDArray[np.float64]:
         turns, before = embedded, None
-        while True:
-            lost = np.flatnonzero(~(_core.area.turn_areas(chart, turns) > _LEAST_AREA))
-            if not len(lost) or turns is before:
-                return turns, lost
+        while turns is not before and len(lost(turns)):
             before = turns
             turns = spread_limbs(
                 surface, chart, turns, forms, conformal.aspect, _LEAST_AREA, drawn=drawn
             )
+        return turns
 
-    turns, lost = spread(False)
-    if len(lost):
+    turns = spread(drawn=False)
+    if len(lost(turns)):
         weighted = _weighted_turns(surface, chart, forms)
-        turns, lost = spread(True) if weighted is None else (weighted, lost[:0])
-    if len(lost):
+        turns = spread(drawn=True) if weighted is None else weighted
+    if len(out := lost(turns)):
         raise SolverError(
-            f"{describe('face', lost)} lie so far out on a long, thin limb that a flat map "
+            f"{describe('face', out)} lie so far out on a long, thin limb that a flat map "
             "shrinks them to nothing: cut the limb short or remesh it coarser",
-            lost,
+            out,
         )
     return turns
 

@@ -71,11 +71,11 @@ def spread_limbs(
         other = turns.copy()
         for faces in _limbs(surface, ~(areas > small * share), lost):
             limb = _Limb.of(surface, faces, forms)
-            at = None
-            if limb is not None:
-                at = _drawn(limb, turns) if drawn else None
-                at = _spread(surface, limb, turns, aspect) if at is None else at
-            if limb is not None and at is not None:
+            if limb is None:
+                continue
+            at = _drawn(limb, turns) if drawn else None
+            at = _spread(surface, limb, turns, aspect) if at is None else at
+            if at is not None:
                 other[limb.vertices] = at
         left = int((~(_core.area.turn_areas(chart, other) > least)).sum())
         if left < fewest:

@@ -157,7 +157,7 @@ def _untangle_refined(run: Run, begin: NDArray[np.float64]) -> None:
     Where the boundary has most of the vertices, the few inside have no place that suits all faces.
     """
     before, history = run.problem, run.history
-    if before.refinement is None:
+    if before.refinement is None or history.budget.spent:
         return
     stuck = stuck_tets(history.model, run.x, glide=False)
     run.x = begin
@@ -187,18 +187,19 @@ def _untangled_halved(run: Run, stuck: NDArray[np.intp], *, glide: bool) -> NDAr
             break
         last = run.problem
         _halve(run, edges(last.solid, left), left)
-        if edges is crowded_edges:
+        if not glide:
+            now = _patched(run, glide=False, rings=_NARROW)
+        elif edges is crowded_edges:
             now = _patched(run, glide=False, few=_FEW_STUCK)
-            if len(now) > len(left):
-                run.take(last)
-                edges = surrounding_edges
-                continue
         else:
             now = stuck_tets(run.history.model, run.x, glide=False)
-        if not glide:
-            left = _patched(run, glide=False, rings=_NARROW)
-        else:
-            left = _patched_gliding(run, now, rings=_NARROW, share=_WORTH) if len(now) else now
+        if edges is crowded_edges and len(now) > len(left):
+            run.take(last)
+            edges = surrounding_edges
+            continue
+        if glide and len(now):
+            now = _patched_gliding(run, now, rings=_NARROW, share=_WORTH)
+        left = now
     if not len(left):
         return left
     run.take(before)

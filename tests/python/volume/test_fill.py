@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from shapes import RING, cubes
 from stretchmap import samples
+from stretchmap.base.budget import Budget
 from stretchmap.errors import (
     ArrayError,
     CertificationError,
@@ -72,6 +74,21 @@ def test_a_twisted_boundary_and_hardly_a_vertex_inside(nu, nv, ratio, turns):
     result = sm.fill(solid, boundary)
     check(solid, boundary, result)
     assert result.converged
+
+
+def test_the_limit_counts_the_tets_given(monkeypatch):
+    """Not those they are split into, of which there are several times as many here."""
+    counted, of = [], Budget.of
+
+    def noted(time_limit, n_tets):
+        counted.append((time_limit, n_tets))
+        return of(time_limit, n_tets)
+
+    monkeypatch.setattr(Budget, "of", noted)
+    wall = TetMesh(*cubes(RING))
+    result = sm.fill(wall, wall.surface.V, options=sm.FillOptions(time_limit=0.5))
+    assert counted == [(0.5, wall.n_tets)]
+    assert result.solid.n_tets > 2 * wall.n_tets
 
 
 def test_a_boundary_that_moved_rigidly_moves_the_inside(ball):
