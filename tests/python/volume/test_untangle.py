@@ -138,6 +138,56 @@ def test_what_is_hopeless_near_by_is_begun_once_more(monkeypatch, better, hasty,
     assert (run.problem.solid is given) == (better != "more" or better not in tried)
 
 
+def test_hopeless_solids_get_no_vertices_when_time_is_up(monkeypatch):
+    run = run_of(sm.samples.bumpy_torus(600))
+    run.history.budget, given = Budget(0.0), run.problem.solid
+    n = given.n_tets
+    monkeypatch.setattr(order, "untangle_whole", lambda _, x, *a, **k: Untangled(x, n, -1.0))
+    monkeypatch.setattr(order, "stuck_tets", lambda *_, **__: np.arange(n))
+    monkeypatch.setattr(order, "_halve", lambda *_: pytest.fail("halved"))
+    assert len(order._untangle_inside(run, glide=True)) == n and run.problem.solid is given
+
+
+def test_halving_ends_before_a_solid_has_too_many_tets(monkeypatch):
+    run = run_of(sm.samples.bumpy_torus(600))
+    n, halve, made = run.problem.solid.n_tets, order._halve, []
+
+    def all_inside(solid, _):
+        inside = (solid.boundary_index[solid.edges] < 0).any(axis=1)
+        return np.ascontiguousarray(solid.edges[inside])
+
+    def noted(run, edges, stuck):
+        halve(run, edges, stuck)
+        made.append(run.problem.solid.n_tets)
+
+    monkeypatch.setattr(order, "_untangle_inside", lambda run, glide: np.arange(3))
+    monkeypatch.setattr(order, "_patched", lambda run, glide: np.arange(3))
+    monkeypatch.setattr(order, "untangle_whole", lambda _, x, *a, **k: Untangled(x, 3, -1.0))
+    monkeypatch.setattr(order, "_inverted", lambda run: 3)
+    monkeypatch.setattr(order, "crowded_edges", all_inside)
+    monkeypatch.setattr(order, "_halve", noted)
+    assert order.untangle(run, glide=False) == 3
+    assert made and 2 * n < max(made) < 10 * n
+
+
+@pytest.mark.parametrize("on_mesh", [False, True])
+def test_a_boundary_on_a_mesh_gives_way_before_edges_are_halved(monkeypatch, on_mesh):
+    run = run_of(sm.samples.bumpy_torus(6000))
+    run.on_mesh, done = on_mesh, []
+    monkeypatch.setattr(order, "untangle_whole", lambda _, x, *a, **k: Untangled(x, 3, -1.0))
+    monkeypatch.setattr(order, "stuck_tets", lambda *_, **__: np.arange(3))
+    monkeypatch.setattr(order, "_patched", lambda *_, **__: np.arange(3))
+    monkeypatch.setattr(order, "freed", lambda run: done.append("freed") or True)
+
+    def halved(run, stuck, *, glide):
+        done.append("halved")
+        return stuck[:0]
+
+    monkeypatch.setattr(order, "_untangled_halved", halved)
+    assert not len(order._untangle_inside(run, glide=False))
+    assert done == (["freed"] if on_mesh else ["halved"])
+
+
 @pytest.mark.parametrize("amplitude", [1.0, 10.0, 1e2, 1e4])
 def test_a_patch_turned_inside_out_and_blown_up_is_untangled(amplitude):
     solid = sm.samples.bumpy_torus(6000)
