@@ -1,20 +1,10 @@
 #include "arrays.hpp"
+#include "solves.hpp"
 #include "stretchmap/linalg/spd_solver.hpp"
 #include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::linalg {
-namespace {
-
-SolveOptions solve_options(double tol, int max_iter, bool must_converge) {
-  return {tol, max_iter, must_converge};
-}
-
-void set_values(double* target, Eigen::Index size, const VecRef& values) {
-  if (values.size() != size) throw Error("SolverError", "the pattern has another number of values");
-  Eigen::Map<Vec>(target, size) = values;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 void bind(py::module_& m) {
   py::class_<SolveReport>(m, "SolveReport")

@@ -19,9 +19,7 @@ void bind_topology(py::module_& m) {
       .def_readonly("faces", &SurfaceTopology::faces)
       .def_readonly("twin", &SurfaceTopology::twin)
       .def_readonly("edge", &SurfaceTopology::edge)
-      .def_readonly("edges", &SurfaceTopology::edges)
-      .def_readonly("edge_halfedge", &SurfaceTopology::edge_halfedge)
-      .def_readonly("vertex_halfedge", &SurfaceTopology::vertex_halfedge);
+      .def_readonly("edges", &SurfaceTopology::edges);
   py::class_<TetBoundary>(m, "TetBoundary")
       .def(py::init(
                [](const TetsRef& tets, Index n) { return tet_boundary(tets, n, signal_poll()); }),

@@ -1,4 +1,5 @@
 #include "arrays.hpp"
+#include "solves.hpp"
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/surface_newton.hpp"
 #include "stretchmap/area/surface_reference.hpp"
@@ -14,15 +15,6 @@
 
 namespace stretchmap::testing {
 namespace {
-
-linalg::SolveOptions solve_options(double tol, int max_iter, bool must_converge) {
-  return {tol, max_iter, must_converge};
-}
-
-void set_values(double* target, Eigen::Index size, const VecRef& values) {
-  if (values.size() != size) throw Error("SolverError", "the pattern has another number of values");
-  Eigen::Map<Vec>(target, size) = values;
-}
 
 void bind_mesh(py::module_& m) {
   m.def("orient3d", &orient3d, py::arg("a"), py::arg("b"), py::arg("c"), py::arg("d"));
@@ -60,7 +52,7 @@ void bind_linalg(py::module_& m) {
       .def(
           "refactor",
           [](linalg::BlockSolver& self, const VecRef& values, bool keep_preconditioner) {
-            set_values(self.matrix().values.data(), self.matrix().values.size(), values);
+            linalg::set_values(self.matrix().values.data(), self.matrix().values.size(), values);
             self.refactor(keep_preconditioner);
           },
           py::arg("values").noconvert(), py::arg("keep_preconditioner") = false, release_gil())
@@ -70,7 +62,7 @@ void bind_linalg(py::module_& m) {
              bool must_converge) {
             const Poll poll = signal_poll();
             linalg::SolveReport report =
-                self.solve(b, x, solve_options(tol, max_iter, must_converge), poll);
+                self.solve(b, x, linalg::solve_options(tol, max_iter, must_converge), poll);
             return std::make_pair(std::move(x), std::move(report));
           },
           py::arg("b").noconvert(), py::arg("x"), py::arg("tol") = 1e-3, py::arg("max_iter") = 500,

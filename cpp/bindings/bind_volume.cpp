@@ -73,11 +73,9 @@ void bind_newton(py::module_& m) {
       .def_readonly("before", &NewtonReport::before)
       .def_readonly("after", &NewtonReport::after)
       .def_readonly("decrement", &NewtonReport::decrement)
-      .def_readonly("gradient_norm", &NewtonReport::gradient_norm)
       .def_readonly("alpha", &NewtonReport::alpha)
       .def_readonly("cg_iterations", &NewtonReport::cg_iterations)
       .def_readonly("negative_curvature", &NewtonReport::negative_curvature)
-      .def_readonly("cg_residual", &NewtonReport::cg_residual)
       .def_readonly("held_up", &NewtonReport::held_up)
       .def_readonly("shift", &NewtonReport::shift);
   py::class_<GlideSurface, std::shared_ptr<GlideSurface>>(m, "GlideSurface")

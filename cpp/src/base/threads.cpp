@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <cstdlib>
 #include <ctime>
 #include <deque>
@@ -76,6 +77,8 @@ class Team : public std::enable_shared_from_this<Team> {
   int hire(int helpers);
   void dismiss();
   void run(Index chunks, int threads, SharedWork work, void* context);
+  // Processor time of all helpers in loops.
+  double seconds() const { return 1e-9 * static_cast<double>(nanoseconds_.load()); }
 
  private:
   // State of a loop: its number, whether helpers may still join, how many of them are in it.
@@ -96,6 +99,7 @@ class Team : public std::enable_shared_from_this<Team> {
   std::atomic<std::uint64_t> state_{0};
   std::atomic<int> threads_{0};  // of the loop, the caller included
   std::atomic<bool> dismissed_{false};
+  std::atomic<std::int64_t> nanoseconds_{0};
   // Of an open loop; helpers read them only after they have joined.
   SharedWork work_ = nullptr;
   void* context_ = nullptr;
@@ -194,8 +198,10 @@ void Team::help(int place, Bed& bed) {
   sharing = true;
   for (std::uint64_t last = 0; !dismissed_;) {
     if (join(place, last)) {
+      const double begin = own_seconds();
       Shares shares(ranges_.get(), threads_, place);
       work_(context_, shares);
+      nanoseconds_ += static_cast<std::int64_t>(1e9 * (own_seconds() - begin));
       leave();
       continue;
     }
@@ -289,5 +295,7 @@ double shared_seconds() {
   employer.counting = true;
   return employer.seconds;
 }
+
+double helper_seconds() { return employer.team ? employer.team->seconds() : 0.0; }
 
 }  // namespace stretchmap

@@ -228,8 +228,7 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
                                    " folded boundary faces; untangle first");
   if (energy_.rows() == 0) return report;
   if (!renew(x, w, options.keep_hessian)) return report;
-  report.gradient_norm = gradient_.norm();
-  if (report.gradient_norm == 0.0) return report;
+  if (gradient_.norm() == 0.0) return report;
   Points direction;
   const std::size_t first = cut_short_ ? 1 : 0;
   for (std::size_t k = first; k < std::size(kShifts); ++k) {

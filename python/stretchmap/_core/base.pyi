@@ -1,7 +1,9 @@
 from __future__ import annotations
 import typing
-__all__: list[str] = ['give_free_memory_back', 'keep_to_one_thread', 'set_thread_count', 'shared_seconds', 'thread_count']
+__all__: list[str] = ['give_free_memory_back', 'helper_seconds', 'keep_to_one_thread', 'set_thread_count', 'shared_seconds', 'thread_count']
 def give_free_memory_back() -> None:
+    ...
+def helper_seconds() -> float:
     ...
 def keep_to_one_thread() -> None:
     ...

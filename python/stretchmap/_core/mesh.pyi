@@ -10,9 +10,6 @@ class SurfaceTopology:
     def edge(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         ...
     @property
-    def edge_halfedge(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
-        ...
-    @property
     def edges(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]"]:
         ...
     @property
@@ -23,9 +20,6 @@ class SurfaceTopology:
         ...
     @property
     def twin(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
-        ...
-    @property
-    def vertex_halfedge(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         ...
 class TetBoundary:
     def __init__(self, tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> None:

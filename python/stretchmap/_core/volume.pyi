@@ -66,13 +66,7 @@ class NewtonReport:
     def cg_iterations(self) -> int:
         ...
     @property
-    def cg_residual(self) -> float:
-        ...
-    @property
     def decrement(self) -> float:
-        ...
-    @property
-    def gradient_norm(self) -> float:
         ...
     @property
     def held_up(self) -> HeldUp:

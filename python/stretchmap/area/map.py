@@ -110,7 +110,7 @@ def area_map(
     keep_best : bool
         Return the map even if it is not certified.
     threads : int, optional
-        Threads to use, see `threads`; the result does not depend on it.
+        Threads to use, see `threads`; the result depends on it only where time runs short.
     progress : Progress, optional
         Called once per step.
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
 
 from .. import _core
-from ..base.budget import Budget
+from ..base.budget import Budget, processor_seconds
 from ..mesh.surfaces import TriMesh
 
 # In units of what a face adds to a step besides its share of the elimination: so many a face of
@@ -77,7 +76,7 @@ class Work:
         Where it is solved more than once in a step, that counts. What its elimination takes, which
         separators tell, holds for finer surfaces, too.
         """
-        self._begun, self._newton, self._solved = time.process_time(), newton, newton.solves
+        self._begun, self._newton, self._solved = processor_seconds(), newton, newton.solves
         self._flops = newton.flops() / n_faces**1.5
 
     def spend(self, steps: int, n_faces: int | None = None, each: float = 1.0) -> None:
@@ -91,7 +90,7 @@ class Work:
         self.left -= units
         if self._begun is not None:
             self._units += units
-            self._seconds += time.process_time() - self._begun
+            self._seconds += processor_seconds() - self._begun
             self._begun = None
 
     def spend_in_chart(self, steps: int) -> None:

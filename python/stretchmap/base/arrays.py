@@ -307,9 +307,9 @@ def given_rows(values: ArrayLike, n: int) -> NDArray[np.float64]:
     Raises
     ------
     ArrayError
-        Another number of rows.
+        Another number of rows, or no numbers.
     """
-    array = np.asarray(values, dtype=np.float64)
+    array = as_reals(values, "values", finite=False)
     if array.ndim == 0 or len(array) != n:
         raise ArrayError(f"values must have {n} rows, not shape {array.shape}")
     return array

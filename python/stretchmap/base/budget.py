@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import time
 
-__all__ = ["Budget", "Spent"]
+from .. import _core
+
+__all__ = ["Budget", "Spent", "processor_seconds"]
 
 _LEAST_SECONDS, _MARGIN = 4.5, 0.9  # a stage under way is ended
+
+
+def processor_seconds() -> float:
+    """Processor time of the calling thread and of those that share its loops, but of no others."""
+    return time.thread_time() + _core.base.helper_seconds()
 
 
 class Spent(Exception):
@@ -14,7 +21,7 @@ class Spent(Exception):
 
 
 class Budget:
-    """Processor time, of all threads, that may be spent.
+    """Processor time that may be spent, by the thread that asks and those that share its loops.
 
     Parameters
     ----------
@@ -23,7 +30,7 @@ class Budget:
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
-        self._end = time.process_time() + seconds
+        self._end = processor_seconds() + seconds
 
     @classmethod
     def of(cls, time_limit: float, n_elements: int) -> Budget:
@@ -37,7 +44,7 @@ class Budget:
     @property
     def left(self) -> float:
         """Seconds."""
-        return max(self._end - time.process_time(), 0.0)
+        return max(self._end - processor_seconds(), 0.0)
 
     @property
     def spent(self) -> bool:

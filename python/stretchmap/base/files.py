@@ -55,6 +55,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     temporary = Path(name)
+    if fcntl is None:
+        os.close(handle)  # no open file can be renamed there
     try:
         if fcntl is not None:
             fcntl.flock(handle, fcntl.LOCK_SH)  # for as long as the file is being written
@@ -66,7 +68,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
         raise
     finally:
-        os.close(handle)
+        if fcntl is not None:
+            os.close(handle)
 
 
 @contextmanager
@@ -82,9 +85,13 @@ def open_to_read(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """
     path = as_path(path)
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    mode = os.fstat(handle).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(handle)
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+        raise FileFormatError(f"{path} is a pipe or a device; save what comes from it first")
     with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise FileFormatError(f"{path} is a pipe or a device; save what comes from it first")
         yield file
 
 

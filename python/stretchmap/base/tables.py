@@ -1,4 +1,4 @@
-"""Small things every output needs: tables, JSON-ready values, versions, files that appear whole."""
+"""Small things every output needs: tables, JSON-ready values, versions."""
 
 from __future__ import annotations
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import zipfile
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -191,17 +190,19 @@ def prescribed_image(solid: TetMesh, path: Path) -> NDArray[np.float64]:
     """The rows of a boundary file in the order of the solid's boundary vertices."""
     import numpy as np
 
+    from ..base.arrays import as_integers, as_points
+    from ..base.files import open_to_read, parsing
     from ..errors import ArrayError, FileFormatError
+    from ..io.npz import read_archive
 
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            ids, image = file["ids"].ravel(), np.asarray(file["image"], np.float64)
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise FileFormatError(
-            f"{path} must be an .npz with ids (nb,) and image (nb, 3): {error}"
-        ) from None
-    if image.shape != (len(ids), 3):
-        raise ArrayError(f"{path}: image has shape {image.shape}, ids {len(ids)} entries")
+    with open_to_read(path) as file, parsing(path):
+        arrays = read_archive(file)
+    if not {"ids", "image"} <= arrays.keys():
+        raise FileFormatError(f"{path} must be an .npz with ids (nb,) and image (nb, 3)")
+    ids = as_integers(arrays["ids"].ravel(), f"ids of {path}", (None,))
+    image = as_points(arrays["image"], f"image of {path}")
+    if len(image) != len(ids):
+        raise ArrayError(f"{path}: image has {len(image)} rows, ids {len(ids)} entries")
     order = np.argsort(ids)
     if not np.array_equal(ids[order], solid.boundary_vertices):
         raise ArrayError(

@@ -1,4 +1,4 @@
-"""Harmonic and holomorphic 1-forms, paper sections 3.2 and 3.3.
+"""Harmonic 1-forms, paper section 3.2.
 
 A 1-form is one number per edge of the surface, along the edge from its lower to its higher vertex.
 """

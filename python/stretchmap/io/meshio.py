@@ -74,7 +74,7 @@ def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
     meshio = _import(f"writing {path.suffix} files")
     kind = "triangle" if mesh.T is None else "tetra"
     options: dict[str, Any] = {"data_format": "XML"} if file_format == "xdmf" else {}
-    with _guarded(path):
+    with _guarded(path, (OSError, MemoryError)):
         out = meshio.Mesh(
             mesh.V,
             [(kind, mesh.elements)],
@@ -120,8 +120,8 @@ def _import(task: str) -> Any:
 
 
 @contextlib.contextmanager
-def _guarded(path: Path) -> Iterator[None]:
-    """Catch what meshio prints and every way it fails."""
+def _guarded(path: Path, system: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Catch what meshio prints and every way it fails, but for what is no fault of the file."""
     output = io.StringIO()
     try:
         with (
@@ -136,6 +136,8 @@ def _guarded(path: Path) -> Iterator[None]:
         raise MissingDependencyError(
             f"{path.suffix} files need {error.name}: pip install 'stretchmap[io]'"
         ) from error
+    except system:
+        raise
     except (Exception, SystemExit) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(reason) from error

@@ -65,7 +65,7 @@ def read_archive(file: BinaryIO) -> dict[str, NDArray[Any]]:
         What NumPy and zipfile raise where it is damaged; see `base.files.parsing`.
     """
     if not zipfile.is_zipfile(file):
-        raise FileFormatError("it is no .npz archive; V and F or T are needed")
+        raise FileFormatError("it is no .npz archive")
     file.seek(0)
     with zipfile.ZipFile(file) as archive:
         size = sum(member.file_size for member in archive.infolist())

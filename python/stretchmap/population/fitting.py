@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.normals import vertex_normals
 from .thin_plate import ThinPlate
 
 __all__ = ["Anchors", "Fit", "Template", "fit_surface"]
@@ -204,12 +205,7 @@ class _Side:
     def __init__(self, points: Array, faces: NDArray[np.int32]) -> None:
         self.V, self.F = np.ascontiguousarray(points), faces
         self.tree = _core.maps.SurfaceTree(self.V, self.F)
-        areas = _core.mesh.face_area_vectors(self.V, self.F)
-        sums = [
-            np.bincount(self.F.ravel(), np.repeat(column, 3), minlength=len(self.V))
-            for column in areas.T
-        ]
-        self.normals = _unit(np.stack(sums, axis=1))
+        self.normals = np.nan_to_num(vertex_normals(self.V, self.F))
 
 
 class _Equations:

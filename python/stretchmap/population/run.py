@@ -78,10 +78,11 @@ def fit(
         under the name ``"template"``.
     folder : path, optional
         The run folder: a JSON record of every shape and round, a map of every shape. A run that was
-        stopped goes on where it was, with the same result bit for bit. Without it the maps are
-        kept in a temporary folder and thrown away.
+        stopped goes on where it was, with the same result. Without it the maps are kept in a
+        temporary folder and thrown away.
     executor : {"serial", "processes", "processes:N", "dask://host:port"}, client or object
-        Where shapes are mapped. The result does not depend on it, to the last bit.
+        Where shapes are mapped. The result does not depend on it, to the last bit, unless a map
+        runs short of time.
     along : {"smooth", "area"}
         What decides where points go along the surface, see `correspond`.
     scale : bool

@@ -23,7 +23,7 @@ from .._version import __version__
 from ..base.files import atomic_path
 from ..base.tables import plain_dict
 from ..base.threads import threads
-from ..errors import LandmarkError, StretchmapError
+from ..errors import LandmarkError, MissingDependencyError, StretchmapError
 from ..io.reading import read_solid
 from ..registration.mirror import MIRROR_ADVICE, mirrored_landmarks
 from .correspondence import Along, correspond
@@ -34,6 +34,9 @@ from .shapes import Shape
 __all__ = ["Job", "Record", "failed", "run_job"]
 
 Record = dict[str, Any]
+
+# What another run, on another machine or after something was installed, need not meet again.
+_OF_THE_MACHINE = (MissingDependencyError, OSError, MemoryError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +109,7 @@ def run_job(job: Job) -> Record:
             record = _mapped(job)
     except (StretchmapError, OSError, MemoryError) as error:
         record = failed(job, f"{type(error).__name__}: {error}")
+        record["once_more"] = isinstance(error, _OF_THE_MACHINE)
     record |= {"key": key, "seconds": time.perf_counter() - clock}
     _write(job, record)
     return record
@@ -182,8 +186,9 @@ def _done(job: Job, key: str) -> Record | None:
         record = json.loads(job.record_file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    same = isinstance(record, dict) and record.get("key") == key
-    return record if same and (not record.get("ok") or job.image_file.exists()) else None
+    if not isinstance(record, dict) or record.get("key") != key or record.get("once_more"):
+        return None
+    return record if not record.get("ok") or job.image_file.exists() else None
 
 
 def _write(job: Job, record: Record) -> None:

@@ -91,7 +91,7 @@ def register(
     options : FillOptions, optional
         Knobs of the volume optimization.
     threads : int, optional
-        Threads to use, see `threads`; the result does not depend on it.
+        Threads to use, see `threads`; the result depends on it only where time runs short.
     progress : Progress, optional
         Called once per step.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .. import _core
 from ..base.progress import Progress, report
 from ..mesh.meshes import TriMesh
-from .quality import DIRECTIONS, EDGES, boundary_quads, vertex_normals
+from .quality import DIRECTIONS, EDGES, angle_weighted_normals, boundary_quads
 from .schedule import ANY_SIZES, EVEN_SIZES, Schedule
 from .sites import surface_sites
 
@@ -75,7 +75,7 @@ class GridOptimizer:
         per_side = _PER_SIDE[closely]
         self._tolerance = _TOLERANCE * float(np.linalg.norm(np.ptp(surface.V, axis=0)))
         self._fit = _core.resample.BoundaryFit(
-            surface.V, surface.F, vertex_normals(surface),
+            surface.V, surface.F, angle_weighted_normals(surface),
             *surface_sites(surface, per_side**2 * len(quads)), quads, per_side,
             _FAR * self._tolerance, closely,
         )  # fmt: skip

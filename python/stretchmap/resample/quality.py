@@ -31,7 +31,7 @@ EDGES = np.array(
 DIRECTIONS = np.array([[0, 1, 2], [1, 0, 2], [0, 1, 2], [1, 0, 2]] + [[1, 0, 2], [0, 1, 2]] * 2)
 
 
-def vertex_normals(surface: TriMesh) -> NDArray[np.float64]:
+def angle_weighted_normals(surface: TriMesh) -> NDArray[np.float64]:
     """(n, 3) unit normals, means of the faces' weighted by their angles."""
     V, F = surface.V, surface.F
     edges = [V[F[:, (k + 1) % 3]] - V[F[:, k]] for k in range(3)]

@@ -116,7 +116,7 @@ def fill(
     keep_best : bool
         Return the best map found even if it is not certified.
     threads : int, optional
-        Threads to use, see `threads`; the result does not depend on it.
+        Threads to use, see `threads`; the result depends on it only where time runs short.
     progress : Progress, optional
         Called once per step.
 

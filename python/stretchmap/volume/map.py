@@ -69,9 +69,9 @@ def volume_map(
         ``"certified"``: a bijection with the least volume distortion, proven by a certificate; in
         the end the volumes between level surfaces of u, v and s (with a frozen boundary: of s) are
         made equal to those of the source.
-        ``"vsem"``: Algorithm 5.1 as it stands in the paper, from an `area_map` with ``tol=0.02``;
-        may leave flipped tets, which are reported. Default: ``"vsem"`` if ``c`` is given, else
-        ``"certified"``.
+        ``"vsem"``: Algorithm 5.1 as it stands in the paper, from an `area_map` of equal face areas,
+        ``tol=0.01`` and ``finish="face"``; may leave flipped tets, which are reported. Default:
+        ``"vsem"`` if ``c`` is given, else ``"certified"``.
     boundary : {"glide", "frozen"}, optional
         Certified route only. ``"glide"`` (default) lets boundary vertices move on the torus,
         ``"frozen"`` keeps them where the area-preserving map put them.
@@ -93,13 +93,13 @@ def volume_map(
         is, on the same torus. What an optimizer of your own returned is one, too.
     optimizer : callable, optional
         ``optimizer(solid, image, torus)`` returns a better image, see `Optimizer`: a method of your
-        own in place of ours, from the same start, measured and certified alike.
+        own in place of ours, from the start of a frozen boundary, measured and certified alike.
     options : VolumeOptions, optional
         All other options.
     keep_best : bool
         Return the best map found even if it is not certified.
     threads : int, optional
-        Threads to use, see `threads`; the result does not depend on it.
+        Threads to use, see `threads`; the result depends on it only where time runs short.
     progress : Progress, optional
         Called once per step.
 
@@ -168,8 +168,11 @@ def volume_map(
     if balance is not None:
         options = balanced(method, balance, options)
     callback("optimizer", optimizer)
-    if optimizer is not None and (method, max_iter, balance) != ("certified", None, None):
-        raise OptionError("an optimizer of your own takes no method, c, max_iter or balance")
+    if optimizer is not None:
+        if (method, max_iter, balance, boundary) != ("certified", None, None, None):
+            raise OptionError(
+                "an optimizer of your own takes no method, boundary, c, max_iter or balance"
+            )
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     if solid.n_tets > _LARGE:
@@ -199,10 +202,14 @@ def volume_map(
     return result
 
 
-def _problem(solid: TetMesh, start: MapResult, refine: bool | None) -> VolumeProblem:
+def _problem(
+    solid: TetMesh, start: MapResult, refine: bool | None, *, unstretch: bool = True
+) -> VolumeProblem:
     image, torus = _start_of(solid, start)
     warm = isinstance(start.mesh, TetMesh)
-    return VolumeProblem.of(solid, image, torus=torus, refine=refine, warm=warm)
+    return VolumeProblem.of(
+        solid, image, torus=torus, refine=refine, warm=warm, unstretch=unstretch
+    )
 
 
 def _own_map(
@@ -235,7 +242,7 @@ def _paper_map(
             solid.surface, ratio=options.ratio or "conformal", phase=options.phase,
             tol=_BOUNDARY_TOL, finish="face", refine=False, keep_best=True, progress=progress,
         )  # fmt: skip
-    problem = _problem(solid, start, None)
+    problem = _problem(solid, start, None, unstretch=False)
     outcome = run_vsem(problem, options, c=c, max_iter=max_iter, progress=progress)
     result = volume_result(outcome, "vsem", "frozen", start)
     _warn(result)

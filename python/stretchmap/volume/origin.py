@@ -23,13 +23,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import as_points
+from ..base.torus import TWO_PI
 from ..errors import ArrayError, LandmarkError
 from ..maps.given import as_map_of_solid
 from ..maps.result import MapResult
 
 __all__ = ["Origin", "origin_of"]
-
-_TWO_PI = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class Origin:
         """Coordinates (n, 3) of the map from this origin on, angles in [0, 2 pi)."""
         uvs = as_points(given, "given")
         angles = self.sign * (uvs[:, :2] - [self.u, self.v])
-        return np.column_stack([np.mod(angles, _TWO_PI), uvs[:, 2]])
+        return np.column_stack([np.mod(angles, TWO_PI), uvs[:, 2]])
 
 
 def origin_of(result: MapResult, landmarks: ArrayLike | None = None) -> Origin:
@@ -140,5 +139,5 @@ def _by_landmarks(result: MapResult, landmarks: ArrayLike) -> Origin:
     outside = np.flatnonzero(~np.isfinite(found[:, 0]))
     if len(outside):
         raise LandmarkError("a landmark lies outside the solid", outside)
-    ahead = np.mod(found[1, 0] - found[0, 0], _TWO_PI) < np.pi
+    ahead = np.mod(found[1, 0] - found[0, 0], TWO_PI) < np.pi
     return Origin(float(found[0, 0]), float(found[0, 1]), 1 if ahead else -1, (1.0, 1.0, 1.0))

@@ -80,6 +80,7 @@ class VolumeProblem:
         pinned: NDArray[np.int32] | None = None,
         refine: bool | None = True,
         warm: bool = False,
+        unstretch: bool = True,
     ) -> VolumeProblem:
         """Of an image of the boundary vertices (nb, 3), or of all vertices (n, 3) to go on from.
 
@@ -97,6 +98,8 @@ class VolumeProblem:
             Whether overconstrained elements are split or refused; None: neither.
         warm : bool
             Whether the image is of all vertices. Their number does not tell, where none is inside.
+        unstretch : bool
+            Whether a stretch common to all tets is undone, see `unstretching`.
 
         Raises
         ------
@@ -106,9 +109,9 @@ class VolumeProblem:
             The boundary image is inside out.
         """
         refinement = None
-        unstretch = unstretching(solid.V, solid.T)
+        rounding = unstretching(solid.V, solid.T) if unstretch else None
         if refine:
-            seen = None if unstretch is None else np.ascontiguousarray(solid.V @ unstretch)
+            seen = None if rounding is None else np.ascontiguousarray(solid.V @ rounding)
             refinement = refine_overconstrained(solid, seen)
         elif refine is not None:
             _refuse_overconstrained(solid)
@@ -132,7 +135,7 @@ class VolumeProblem:
         return cls(
             solid=mesh,
             refinement=refinement,
-            V=np.ascontiguousarray(V if unstretch is None else V @ unstretch),
+            V=np.ascontiguousarray(V if rounding is None else V @ rounding),
             x=np.ascontiguousarray((x - center) / length),
             center=center,
             length=length,

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <new>
 #include <thread>
 #include <vector>
 
@@ -91,6 +92,47 @@ TEST_CASE("small loops stay with the thread that begins them") {
     if (std::this_thread::get_id() != own) alone = false;
   });
   CHECK(alone);
+}
+
+TEST_CASE("what a shared loop throws is thrown once all threads are done, and the next one runs") {
+  for (const int threads : {1, 4}) {
+    const ThreadCount count(threads);
+    for (int round = 0; round < 20; ++round) {
+      CHECK_THROWS_AS(stretchmap::for_tasks(64,
+                                            [](Index task) {
+                                              if (task % 2) throw std::bad_alloc();
+                                            }),
+                      std::bad_alloc);
+      std::atomic<int> done{0};
+      stretchmap::for_tasks(64, [&](Index) { ++done; });
+      CHECK(done == 64);
+    }
+  }
+}
+
+TEST_CASE("what helpers compute is counted with the thread they help, and with no other") {
+  const ThreadCount count(2);
+  const auto busy_until_both_came = [] {
+    std::atomic<int> here{0};
+    stretchmap::for_tasks(2, [&](Index) {
+      ++here;
+      while (here < 2) std::this_thread::yield();
+      harmonic_sum(1'000'000);
+    });
+  };
+  const double before = stretchmap::helper_seconds();
+  double others = 0.0, own = 0.0;
+  std::thread([&] {
+    stretchmap::set_thread_count(2);
+    others = stretchmap::helper_seconds();
+    busy_until_both_came();
+    own = stretchmap::helper_seconds();
+  }).join();
+  CHECK(others == 0.0);
+  CHECK(own > 0.0);
+  CHECK(stretchmap::helper_seconds() == before);
+  busy_until_both_came();
+  CHECK(stretchmap::helper_seconds() > before);
 }
 
 TEST_CASE("time in shared loops is counted with one thread, too") {

@@ -116,8 +116,23 @@ def test_pipes_and_devices_are_neither_read_nor_replaced(tmp_path):
             write(tmp_path / name)
     with pytest.raises(IsADirectoryError):
         write(tmp_path)
-    with pytest.raises(IsADirectoryError), open_to_read(tmp_path):
+    with pytest.raises(IsADirectoryError, match=str(tmp_path)), open_to_read(tmp_path):
         pass
+    before = len(os.listdir("/proc/self/fd")) if sys.platform == "linux" else 0
+    for name in (".", "pipe.obj"):
+        with pytest.raises((IsADirectoryError, FileFormatError)), open_to_read(tmp_path / name):
+            pass
+    assert not before or len(os.listdir("/proc/self/fd")) == before
+
+
+def test_without_locks_the_temporary_file_is_closed_before_it_is_renamed(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "fcntl", None)
+    closed, close = [], os.close
+    monkeypatch.setattr(files.os, "close", lambda handle: (closed.append(handle), close(handle)))
+    with atomic_path(tmp_path / "a.txt") as temporary:
+        assert len(closed) == 1
+        temporary.write_text("a", encoding="utf-8")
+    assert len(closed) == 1 and (tmp_path / "a.txt").read_text(encoding="utf-8") == "a"
 
 
 def test_a_full_disk_is_named(tmp_path, monkeypatch):

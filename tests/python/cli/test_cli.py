@@ -268,6 +268,29 @@ def test_certify_judges_any_map_file(folder, capsys, solid):
     assert bad["ids"]["image_positive"]
 
 
+def test_a_boundary_is_filled_from_its_file_or_refused(folder, capsys, solid):
+    ids, image = solid.boundary_vertices, 2.0 * solid.surface.V
+    command = ["fill", "solid.npz", "--boundary", "b.npz", "-o", "x.npz", "-q"]
+    turned = np.arange(len(ids))[::-1]
+    np.savez("b.npz", ids=ids[turned], image=image[turned])
+    assert main(command) == 0
+    np.testing.assert_array_equal(sm.load_map("x.npz").image[ids], image)
+    Path("x.npz").unlink()
+    for arrays, word in (
+        ({"ids": ids}, "must be an .npz with ids"),
+        ({"ids": ids[1:], "image": image[1:]}, "each once"),
+        ({"ids": ids[1:], "image": image}, "entries"),
+        ({"ids": ids.astype(float), "image": image}, "ids of b.npz must hold integers"),
+        ({"ids": ids, "image": image[:, :2]}, "image of b.npz must have shape"),
+    ):
+        np.savez("b.npz", **arrays)
+        code, message = failing(capsys, *command)
+        assert code == 2 and word in message
+    np.save("b.npy", image)
+    code, message = failing(capsys, *command[:3], "b.npy", *command[4:])
+    assert code == 2 and "b.npy" in message and "no .npz archive" in message
+
+
 def test_keep_best_keeps_an_uncertified_map_and_still_exits_1(folder, capsys, monkeypatch):
     from dataclasses import replace
 

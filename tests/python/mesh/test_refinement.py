@@ -183,6 +183,8 @@ def test_prolong_wants_one_row_per_input_vertex():
     done = refine_overconstrained(cubes(shapes.RING))
     with pytest.raises(ArrayError):
         done.prolong(np.zeros(3))
+    with pytest.raises(ArrayError, match="real numbers"):
+        done.prolong(["a"] * (done.solid.n_vertices - done.n_split))
 
 
 def test_bad_solids_are_refused():

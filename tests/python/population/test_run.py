@@ -16,7 +16,8 @@ import pytest
 import stretchmap as sm
 from population import dying
 from population.truth import correspondence_errors, material, mode_angles, size
-from stretchmap.errors import OptionError, SolverError
+from stretchmap.errors import MissingDependencyError, OptionError, SolverError
+from stretchmap.population import task
 from stretchmap.population.executors import WorkerLost, as_executor
 from stretchmap.population.shapes import gather_shapes
 from stretchmap.samples.solids import cut_cells
@@ -71,6 +72,24 @@ def test_a_bad_file_is_named_and_skipped(serial, folder):
     assert "bad" in serial.summary()
     record = json.loads((serial.folder / "records" / "bad-0.json").read_text())
     assert record["ok"] is False and record["error"] == serial.skipped["bad"]
+
+
+def test_what_was_the_fault_of_the_machine_is_tried_again(folder, tmp_path, monkeypatch):
+    mapped, calls = task._mapped, []
+
+    def once(job):
+        calls.append(job.shape.name)
+        if job.shape.name == "bone1" and calls.count("bone1") == 1:
+            raise MissingDependencyError("reading needs a package")
+        return mapped(job)
+
+    monkeypatch.setattr(task, "_mapped", once)
+    options = {"folder": tmp_path, "max_rounds": 1, "tol": 0.0}
+    first = sm.population.fit(folder, **options)
+    assert set(first.skipped) == {"bad", "bone1"}
+    again = sm.population.fit(folder, **options)
+    assert set(again.skipped) == {"bad"}
+    assert calls.count("bad") == calls.count("bone0") == 1
 
 
 def test_maps_are_kept(serial):

@@ -90,7 +90,7 @@ def test_errors_name_what_is_wrong():
         sm.volume_map(SOLID, optimizer=lambda solid, image, torus: None)
     with pytest.raises(OrientationError, match="inside out"):
         sm.volume_map(SOLID, optimizer=lambda solid, image, torus: image * [1.0, 1.0, -1.0])
-    for options in ({"c": 1.0}, {"max_iter": 3}, {"balance": 0.5}):
+    for options in ({"c": 1.0}, {"max_iter": 3}, {"balance": 0.5}, {"boundary": "glide"}):
         with pytest.raises(OptionError, match="takes no"):
             sm.volume_map(SOLID, optimizer=newton, **options)
 

@@ -10,6 +10,7 @@ import igl
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
 
 import stretchmap as sm
 from shapes import mug
@@ -209,6 +210,23 @@ def test_algorithm_starts_from_faces_of_nearly_exact_area(bumpy):
     given = sm.volume_map(bumpy, c=10.0, max_iter=3, start=boundary)
     assert boundary.distortion.element_std <= 0.01 and boundary.distortion.ring_std < 0.01
     assert (own.image == given.image).all()
+
+
+def test_algorithm_begins_with_the_harmonic_map_of_a_stretched_solid_as_it_is(bumpy):
+    """The certified route undoes a stretch of all tets, the published method does not."""
+    solid = sm.TetMesh(bumpy.V * [20.0, 1.0, 1.0], bumpy.T)
+    boundary = sm.area_map(solid.surface, keep_best=True)
+    result = sm.volume_map(solid, c=0.0, max_iter=1, start=boundary)
+    L = igl.cotmatrix(solid.V, solid.T).tocsr()
+    held = solid.boundary_vertices
+    free = np.setdiff1d(np.arange(solid.n_vertices), held)
+    harmonic = np.zeros((solid.n_vertices, 3))
+    harmonic[held] = boundary.image
+    harmonic[free] = spsolve(L[free][:, free].tocsc(), -L[free][:, held] @ boundary.image)
+    shares = [np.abs(_core.mesh.tet_volumes(X, solid.T)) for X in (solid.V, harmonic)]
+    enclosed = _core.mesh.enclosed_volume(boundary.image, solid.surface.F)
+    rest, volumes = shares[0] / solid.volume, shares[1] / enclosed
+    assert result.history[0].energy == pytest.approx(1.5 * (volumes**2 / rest).sum(), rel=1e-5)
 
 
 def test_a_large_run_says_how_much_memory_it_needs(bumpy, caplog, monkeypatch):

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstddef>
+#include <exception>
 #include <vector>
 
 #include "stretchmap/base/buffer.hpp"
@@ -28,13 +30,27 @@ inline constexpr Index kChunk = 2048, kElementChunk = 512, kCostlyChunk = 64;
 
 inline Index chunk_count(Index n, Index size = kChunk) { return (n + size - 1) / size; }
 
-// work(shares) by every thread that takes part.
+// work(shares) by every thread that takes part. What one of them throws, the first if several do,
+// is thrown once all are done.
 template <class Work>
 void share_chunks(Index chunks, Work& work) {
+  struct Shared {
+    Work& work;
+    std::atomic_flag failed = ATOMIC_FLAG_INIT;
+    std::exception_ptr error = nullptr;
+  } shared{work};
   share_out(
       chunks,
-      [](void* context, Shares& shares) noexcept { (*static_cast<Work*>(context))(shares); },
-      &work);
+      [](void* context, Shares& shares) noexcept {
+        Shared& all = *static_cast<Shared*>(context);
+        try {
+          all.work(shares);
+        } catch (...) {
+          if (!all.failed.test_and_set()) all.error = std::current_exception();
+        }
+      },
+      &shared);
+  if (shared.error) std::rethrow_exception(shared.error);
 }
 
 // body(task) for every task of [0, count), each of them worth a thread.

@@ -47,4 +47,7 @@ void share_out(Index chunks, SharedWork work, void* context);
 // many threads there are, since it began to count; the first call begins.
 double shared_seconds();
 
+// The same of the helpers of the calling thread, from the first loop on.
+double helper_seconds();
+
 }  // namespace stretchmap
