@@ -4,8 +4,6 @@
 #include "stretchmap/linalg/symmetric.hpp"
 
 namespace stretchmap::linalg {
-namespace {}  // namespace
-
 void bind(py::module_& m) {
   py::class_<SolveReport>(m, "SolveReport")
       .def_readonly("iterations", &SolveReport::iterations)
