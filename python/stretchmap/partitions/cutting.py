@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.options import memory
 from ..base.torus import TWO_PI, Torus
 from ..mesh.meshes import TetMesh
 
 _NO_GATE = np.zeros(0)
+# Bytes for each piece while the next level is cut, most of which leave it alone.
+_BYTES_PER_PIECE = 600
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,7 @@ class Pieces:
     def _split(
         self, T: NDArray[np.int32], values: NDArray[np.float64], gate: NDArray[np.float64]
     ) -> tuple[Pieces, NDArray[np.int32]]:
+        memory("so many parts of pieces this small", _BYTES_PER_PIECE * len(self.T))
         split = _core.partitions.split_tets(
             T, np.ascontiguousarray(values), np.ascontiguousarray(gate)
         )
@@ -124,12 +129,26 @@ class Pieces:
         return np.asarray(places, np.intp)
 
 
+def middle_first(levels: NDArray[np.float64]) -> Iterator[float]:
+    """Ascending levels in an order in which each cuts what few before it have cut.
+
+    One after the other, every level cuts all the pieces that those before it have left of the rest
+    of a tet, and their number grows with its cube.
+    """
+    if not len(levels):
+        return
+    middle = len(levels) // 2
+    yield float(levels[middle])
+    yield from middle_first(levels[:middle])
+    yield from middle_first(levels[middle + 1 :])
+
+
 def cut_all(
     pieces: Pieces, axes: tuple[str, ...], levels: list[NDArray[np.float64]]
 ) -> tuple[Pieces, NDArray[np.int32]]:
     """Cut the whole along every level; the pieces and the part of each."""
     for axis, cuts in zip(axes, levels, strict=True):
-        for level in cuts:
+        for level in middle_first(cuts):
             pieces = pieces.cut(axis, level)
     labels = np.zeros(len(pieces.T), np.intp)
     for axis, cuts in zip(axes, levels, strict=True):

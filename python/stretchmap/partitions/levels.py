@@ -15,7 +15,7 @@ from ..base.arrays import as_reals
 from ..base.options import one_of, whole
 from ..base.torus import TWO_PI
 from ..errors import MeshError, OptionError, SolverError
-from .cutting import Pieces
+from .cutting import Pieces, middle_first
 
 Coordinate = Literal["s", "u", "v"]
 
@@ -136,7 +136,7 @@ def cut_nested(
         cuts = []
         for cell in range(math.prod(before)):
             cuts.append(levels_of(pieces.only(labels == cell), axis, share, start, "source"))
-            for level in cuts[-1]:
+            for level in middle_first(cuts[-1]):
                 pieces, origin = pieces.cut_within(labels == cell, axis, level)
                 labels = labels[origin]
         parts = np.zeros(len(labels), np.intp)

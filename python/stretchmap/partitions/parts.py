@@ -218,7 +218,7 @@ def partition(
     Raises
     ------
     OptionError
-        If an option is out of range or the map has no torus.
+        If an option is out of range, the map has no torus, or the pieces do not fit into memory.
     KindError
         If it is no map, or that of a surface.
     SolverError

@@ -27,6 +27,7 @@ from .model import FIXED, GLIDING, History, SolidModel
 __all__ = [
     "MOST_STUCK",
     "Untangled",
+    "far_tets",
     "folded_faces",
     "stuck_tets",
     "untangle_patches",
@@ -62,6 +63,9 @@ _FEW_PATIENCE = 4
 # served better by patches.
 MOST_STUCK, _HASTY_PATIENCE = 0.05, 10
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
+# Times the volume a tet may expect: what is that large, or inverted to that size, holds up all steps
+# for the whole, whose energy it is.
+_FAR = 100.0
 # Steps in a row, none longer than that and none with fewer inverted elements than there had been:
 # a few of them are so far off that all others wait for them.
 _JAMMED, _SHORT = 8, 0.125
@@ -241,6 +245,12 @@ def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDA
         # Of a tet without a boundary face, at least two vertices lie inside.
         stuck |= (inside[model.T].sum(axis=1) == 1) & touched[model.T].all(axis=1)
     return np.flatnonzero(stuck)
+
+
+def far_tets(model: SolidModel, x: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Tets whose image, inverted or not, is very many times the volume they may expect."""
+    expected = _core.mesh.tet_volumes(model.V, model.T) * model.roomy_volumes
+    return np.flatnonzero(np.abs(_core.mesh.tet_volumes(x, model.T)) > _FAR * expected)
 
 
 def folded_faces(model: SolidModel, x: NDArray[np.float64]) -> NDArray[np.intp]:

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from ..mesh.refinement import crowded_edges, surrounding_edges
 from .ground import untangle_on_mesh
 from .run import Run
-from .untangle import MOST_STUCK, folded_faces, stuck_tets, untangle_patches, untangle_whole
+from .untangle import (
+    MOST_STUCK,
+    far_tets,
+    folded_faces,
+    stuck_tets,
+    untangle_patches,
+    untangle_whole,
+)
 
 __all__ = ["freed", "release", "untangle"]
 
@@ -110,8 +117,11 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     A boundary that is going to glide on a mesh gives way before that. On a torus all of it would
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
-    history, begin = run.history, run.x
+    history = run.history
     if not run.resumed:  # else it has been at its end
+        _bring_near(run)
+    begin = run.x
+    if not run.resumed:
         run.x = untangle_whole(history.model, begin, history, glide=False, hasty=run.hasty).x
     if run.hasty and run.afar and _hopeless(run):
         near, inverted = run.x, _inverted(run)
@@ -149,6 +159,22 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
         run.take(before)
         return stuck
     return _untangled_halved(run, left, glide=glide) if cheap and len(left) else left
+
+
+def _bring_near(run: Run) -> None:
+    """What is far too large for where it is, brought down to that by itself, all else held.
+
+    Where a boundary image squeezes a limb within a few edges, the harmonic map sees the body outside
+    farther into it than there is room.
+    """
+    model = run.history.model
+    far = far_tets(model, run.x)
+    if not len(far):
+        return
+    run.x = untangle_patches(
+        model, run.x, far, rings=_RINGS[0], glide=False, budget=run.history.budget
+    )
+    _log.info("%d tets were far too large for where they are", len(far))
 
 
 def _untangle_refined(run: Run, begin: NDArray[np.float64]) -> None:

@@ -8,7 +8,9 @@ import pytest
 import stretchmap as sm
 from shapes import a_map
 from stretchmap import _core, samples
+from stretchmap.base import options
 from stretchmap.errors import ArrayError, OptionError, SolverError
+from stretchmap.partitions.cutting import middle_first
 from stretchmap.partitions.parts import partition
 
 RNG = np.random.default_rng(3)
@@ -136,6 +138,16 @@ def test_uncorrected_cells_are_those_of_the_image(bumpy_map):
     assert np.array_equal(
         raw.uncorrected_errors, partition(bumpy_map, (3, 2), ("u", "s")).uncorrected_errors
     )
+
+
+def test_many_parts_take_no_more_pieces_than_they_must(bumpy_map, monkeypatch):
+    """Levels in their order leave a number of pieces that grows with its cube."""
+    few, many = (sm.partition(bumpy_map, n).solid.n_tets for n in (10, 20))
+    assert many < 4.6 * few
+    monkeypatch.setattr(options, "installed_memory", lambda: 1e6)
+    with pytest.raises(OptionError, match="so many parts of pieces"):
+        sm.partition(bumpy_map, 20)
+    assert list(middle_first(np.arange(1.0, 8.0))) == [4, 2, 1, 3, 6, 5, 7]
 
 
 def test_cutting_one_tet_gives_the_share_of_the_formula():

@@ -115,6 +115,20 @@ def test_a_limb_squeezed_by_orders_of_magnitude(ball, power):
     assert result.converged
 
 
+def test_a_cap_squeezed_at_once_does_not_hold_up_all_the_rest(ball):
+    """The harmonic map sees the body outside far into it; that is mended where it is."""
+    V = ball.surface.V / np.linalg.norm(ball.surface.V, axis=1)[:, None]
+    polar, around = np.arccos(np.clip(V[:, 2], -1.0, 1.0)), np.arctan2(V[:, 1], V[:, 0])
+    rest = (polar - 1.0) * (np.pi - 1e-3) / (np.pi - 1.0)
+    squeezed = np.where(polar < 1.0, 1e-3 * polar, 1e-3 + rest)
+    ring = np.sin(squeezed)
+    boundary = np.stack([ring * np.cos(around), ring * np.sin(around), np.cos(squeezed)], axis=1)
+    result = sm.fill(ball, boundary)
+    check(ball, boundary, result)
+    assert result.converged and result.history[0].stage == "untangle"
+    assert result.history[0].energy < 20.0  # 200 with what is far too large
+
+
 @pytest.mark.parametrize("solid", [samples.solid_torus(900), samples.solid_double_torus(2)])
 def test_solids_of_any_genus(solid):
     V = solid.surface.V
