@@ -28,7 +28,7 @@ def for_legacy_vtk(array: NDArray[Any]) -> NDArray[Any]:
     return array.astype(np.int64) if array.dtype.kind in "biu" else array
 
 
-def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
+def as_points(points: ArrayLike, name: str = "V", *, or_none: bool = False) -> NDArray[np.float64]:
     """Convert points to a read-only C-ordered copy.
 
     Parameters
@@ -36,6 +36,8 @@ def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
     points : (n, 3) array_like of real numbers
     name : str
         What the caller names the array, for messages.
+    or_none : bool
+        Whether there may be no point at all, as in a list of queries.
 
     Returns
     -------
@@ -44,13 +46,15 @@ def as_points(points: ArrayLike, name: str = "V") -> NDArray[np.float64]:
     Raises
     ------
     ArrayError
-        Not a real (n, 3) array with at least one row, or coordinates beyond `LARGEST`.
+        Not a real (n, 3) array, no row where there must be one, or coordinates beyond `LARGEST`.
     NonFiniteError
         A NaN or an infinity; ``ids`` are the rows.
     """
     raw = _as_array(points, name)
     if raw.dtype.kind not in "fiu":
         raise ArrayError(f"{name} must hold real numbers, not {_kind(raw)}")
+    if or_none and raw.shape in ((0,), (0, 3)):
+        return read_only(np.zeros((0, 3)))
     _check_shape(raw, name, 3, "points")
     copy = np.array(_as_doubles(raw, name), dtype=np.float64, order="C")
     if len(copy) > INT32_MAX:
@@ -217,6 +221,8 @@ def as_integers(
         A number out of range; ``ids`` are the rows.
     """
     raw = _as_array(values, name)
+    if raw.shape == (0,):
+        raw = raw.astype(np.int64)  # an empty list is one of floats to NumPy
     if raw.dtype.kind not in "iu":
         raise ArrayError(f"{name} must hold integers, not {_kind(raw)}")
     _check_axes(raw, name, shape)

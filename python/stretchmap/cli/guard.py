@@ -19,6 +19,7 @@ SUCCESS, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 
 # Seconds an interrupted computation gets to clean up before the process ends all the same.
 _GRACE = 1.0
+_ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 _NO_FAULT_OF_THE_INPUT = {errno.ENOSPC, errno.EIO, errno.EDQUOT}
 
 
@@ -35,7 +36,7 @@ def guarded(run: Callable[[], object]) -> int:
     int
     """
     try:
-        with _warnings_on_stderr(), _quick_interrupt():
+        with _warnings_on_stderr(), _ended_like_interrupted(), _quick_interrupt():
             code = run()
         if code == INTERRUPTED:  # typer has seen it first
             raise KeyboardInterrupt
@@ -101,6 +102,20 @@ def _warnings_on_stderr() -> Iterator[None]:
 
 
 @contextmanager
+def _ended_like_interrupted() -> Iterator[None]:
+    """Let what asks a process to end do so by Ctrl-C's way: nothing is left behind."""
+    in_main = threading.current_thread() is threading.main_thread()
+    ours = [s for s in _ENDING if in_main and signal.getsignal(s) == signal.SIG_DFL]
+    for each in ours:
+        signal.signal(each, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for each in ours:
+            signal.signal(each, signal.SIG_DFL)
+
+
+@contextmanager
 def _quick_interrupt() -> Iterator[None]:
     """End the process soon after Ctrl-C even while a long call keeps Python from noticing it.
 
@@ -121,7 +136,7 @@ def _quick_interrupt() -> Iterator[None]:
             received = reader.recv(1)
             if not received:
                 return
-            if received[0] == signal.SIGINT and not done.wait(_GRACE):
+            if received[0] in (signal.SIGINT, *_ENDING) and not done.wait(_GRACE):
                 os.write(2, b"stretchmap: interrupted\n")
                 os._exit(INTERRUPTED)
 

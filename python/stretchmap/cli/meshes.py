@@ -10,6 +10,7 @@ import typer
 
 from . import common
 from .common import Compact, Input, Json, Orient, Output, Quiet
+from .guard import in_words_of_the_command_line
 
 
 class Filler(str, Enum):
@@ -38,6 +39,7 @@ def info(
     """Describe a mesh and list every defect."""
     from ..base.tables import versions
     from ..errors import MeshError
+    from ..mesh.crossings import require_no_crossing
     from ..mesh.meshes import TetMesh
 
     if json is not None:
@@ -52,6 +54,9 @@ def info(
         else:
             size = f"area {mesh.area:.6g}"
             mesh.require_genus_one()
+        require_no_crossing(
+            mesh.surface if isinstance(mesh, TetMesh) else mesh, "the surface", "repair it there"
+        )
     except MeshError as error:
         obstacle = str(error)
     report: dict[str, Any] = {
@@ -72,9 +77,10 @@ def info(
         "versions": versions(),
     }
     if not quiet:
-        typer.echo(diagnosis.summary())
+        typer.echo(in_words_of_the_command_line(diagnosis.summary()))
         typer.echo(size)
-        typer.echo(f"can be mapped to the torus: {'no' if obstacle else 'yes'}")
+        why = obstacle if obstacle and diagnosis.ok else ""
+        typer.echo(f"can be mapped to the torus: {'no' if obstacle else 'yes'}{why and f', {why}'}")
     common.write_json(json, report)
 
 

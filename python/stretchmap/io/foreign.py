@@ -108,10 +108,14 @@ def _blocks(arrays: dict[str, NDArray[Any]]) -> list[Block]:
 def run_vtk(path: Path, out: Path) -> tuple[int, str]:
     """Have VTK read a file and write its arrays to another; exit code and what it complained of."""
     run = subprocess.run(
-        [sys.executable, "-c", VTK_SCRIPT, str(path.resolve()), str(out)],
+        [sys.executable, "-W", "ignore", "-c", VTK_SCRIPT, str(path.resolve()), str(out)],
         capture_output=True, text=True, errors="replace", cwd=out.parent, check=False,
     )  # fmt: skip
     return run.returncode, run.stderr
+
+
+def _and_trimesh(missing: str | None) -> str:
+    return "trimesh" if missing in (None, "trimesh") else f"trimesh and {missing}"
 
 
 def read_trimesh(path: Path) -> MeshArrays:
@@ -131,7 +135,7 @@ def read_trimesh(path: Path) -> MeshArrays:
         mesh: Any = scene.to_mesh()
     except ImportError as error:
         raise MissingDependencyError(
-            f"reading {path.suffix} files needs trimesh and {error.name}: "
+            f"reading {path.suffix} files needs {_and_trimesh(error.name)}: "
             "pip install 'stretchmap[interop]' networkx lxml"
         ) from error
     if not len(mesh.faces):

@@ -72,7 +72,10 @@ def _own(fields: Fields) -> Fields:
     fields = {name.removeprefix("point:").removeprefix("cell:"): a for name, a in fields.items()}
     left_out = sorted(fields.keys() & OF_MAPS)
     if left_out:
-        _log.info("fields of the input a map has itself are left out: %s", ", ".join(left_out))
+        _log.warning(
+            "fields named like what a map holds itself are left out: %s; give them other names",
+            ", ".join(left_out),
+        )
     return {k.replace("/", "_"): a for k, a in fields.items() if k not in OF_MAPS}
 
 

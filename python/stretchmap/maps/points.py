@@ -167,7 +167,7 @@ class PointMap:
         return self._carry(points, 1)
 
     def _carry(self, points: ArrayLike, start: int) -> Located:
-        queries = as_points(points, "points")
+        queries = as_points(points, "points", or_none=True)
         locator = self._locators[start]
         if locator is None:
             V = self._ends[start]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..base.arrays import as_reals, read_only
+from ..base.arrays import as_points, as_reals, read_only
 from ..base.options import instance
 from ..base.tables import HasSummary, plain_dict, table
 from ..base.torus import Torus
@@ -188,7 +188,7 @@ def distortion(
     True
     """
     mesh = as_mesh(mesh)
-    points = as_reals(image, "image", (len(mesh.V), 3))
+    points = as_points(as_reals(image, "image", (len(mesh.V), 3)), "image")
     if torus is not None:
         instance("torus", torus, Torus, "Torus(R, r)")
     if angles is not None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,9 @@ class Diagnosis(HasSummary):
         where it has a border, is not manifold or not orientable.
     cavity_vertices : (a,) ndarray of int32
         Vertices on all components of a solid's boundary but the one with the most faces.
+    coincident : (a,) ndarray of int32
+        Vertices exactly where one of a lower id is, which have to be welded if they are meant to be
+        one. Looked for only where there are several components or the genus is not 1.
 
     Examples
     --------
@@ -103,6 +107,7 @@ class Diagnosis(HasSummary):
     nonmanifold_faces: Ids = field(default_factory=lambda: _none(0, 3))
     border_edges: Ids = field(default_factory=lambda: _none(0, 2))
     cavity_vertices: Ids = field(default_factory=lambda: _none(0))
+    coincident: Ids = field(default_factory=lambda: _none(0))
 
     def __repr__(self) -> str:
         found = _count(len(self.defects), "defect") if self.defects else "no defects"
@@ -137,7 +142,7 @@ class Diagnosis(HasSummary):
         ]
         lines += [f"- {defect.message}" for defect in self.defects]
         if self.ok:
-            lines.append("no defects")
+            lines.append(f"no defects{self._welding()}")
         return "\n".join(lines)
 
     def require(self, names: Iterable[str] | None = None) -> None:
@@ -180,19 +185,20 @@ class Diagnosis(HasSummary):
                 raise GenusError(
                     f"the surface has {self._genus_text()}; a torus, genus 1, is needed"
                     + _genus_hint(genus)
+                    + self._welding()
                 )
             return
         if len(genus) > 1:
             raise GenusError(
                 f"the boundary of the solid has {len(genus)} components of genus "
                 f"{', '.join(map(str, genus))}: a solid torus has none but its outer skin; fill "
-                f"the cavities ({describe('vertex', self.cavity_vertices)})",
+                f"the cavities ({describe('vertex', self.cavity_vertices)}){self._welding()}",
                 self.cavity_vertices,
             )
         if genus != [1]:
             raise GenusError(
                 f"the boundary of the solid has {self._genus_text()}; a solid torus, whose "
-                "boundary has genus 1, is needed" + _genus_hint(genus)
+                "boundary has genus 1, is needed" + _genus_hint(genus) + self._welding()
             )
         if int(self.euler.sum()) != 0:
             raise GenusError(
@@ -202,13 +208,22 @@ class Diagnosis(HasSummary):
     def _genus_text(self) -> str:
         if not len(self.genus) or (self.genus < 0).any():
             return "no genus (not closed, manifold and orientable)"
-        return "genus " + ", ".join(map(str, self.genus.tolist()))
+        return "genus " + _listed(self.genus)
+
+    def _welding(self) -> str:
+        """What to do first where vertices that seem to be one are several."""
+        if not len(self.coincident):
+            return ""
+        return f"; {describe('vertex', self.coincident)} exactly where others are: weld them first"
 
     def _defects(self) -> Iterable[Defect]:
         for wording in WORDINGS[self.kind]:
             ids = getattr(self, wording.name)
             if len(ids):
-                yield wording.defect(ids)
+                defect = wording.defect(ids)
+                if wording.name == "border_edges":
+                    defect = replace(defect, message=defect.message + self._welding())
+                yield defect
         if self.n_components > 1:
             yield self._disconnected()
 
@@ -216,11 +231,11 @@ class Diagnosis(HasSummary):
         kept = self.component[self.component >= 0]
         sizes = np.bincount(kept)
         others = np.flatnonzero((self.component >= 0) & (self.component != sizes.argmax()))
-        counts = ", ".join(map(str, sizes[:5].tolist())) + (", ..." if len(sizes) > 5 else "")
+        counts = _listed(sizes)
         return Defect(
             "component",
             f"the {self.kind} has {len(sizes)} components of {counts} {self.element}s; keep one "
-            f"of them (all but the largest: {describe(self.element, others)})",
+            f"of them (all but the largest: {describe(self.element, others)}){self._welding()}",
             tuple(others.tolist()),
             ConnectivityError,
         )
@@ -229,7 +244,7 @@ class Diagnosis(HasSummary):
 def diagnose_surface(V: NDArray[np.float64], F: NDArray[np.int32]) -> Diagnosis:
     """Diagnose a surface given by validated arrays, see `TriMesh.diagnose`."""
     found = _core.mesh.SurfaceDiagnosis(V, F)
-    return Diagnosis(
+    diagnosis = Diagnosis(
         kind="surface",
         n_vertices=len(V),
         n_elements=len(F),
@@ -238,6 +253,7 @@ def diagnose_surface(V: NDArray[np.float64], F: NDArray[np.int32]) -> Diagnosis:
         genus=found.genus,
         **_common(found),
     )
+    return _with_coincident(diagnosis, V)
 
 
 def diagnose_solid(V: NDArray[np.float64], T: NDArray[np.int32]) -> Diagnosis:
@@ -245,7 +261,7 @@ def diagnose_solid(V: NDArray[np.float64], T: NDArray[np.int32]) -> Diagnosis:
     found = _core.mesh.SolidDiagnosis(V, T)
     parts = found.boundary_component
     cavity = parts != np.bincount(parts[parts >= 0], minlength=1).argmax()
-    return Diagnosis(
+    diagnosis = Diagnosis(
         kind="solid",
         n_vertices=len(V),
         n_elements=len(T),
@@ -255,6 +271,7 @@ def diagnose_solid(V: NDArray[np.float64], T: NDArray[np.int32]) -> Diagnosis:
         cavity_vertices=read_only(np.unique(found.boundary_faces[cavity])),
         **_common(found),
     )
+    return _with_coincident(diagnosis, V)
 
 
 def _common(found: _core.mesh.SurfaceDiagnosis | _core.mesh.SolidDiagnosis) -> dict[str, Ids]:
@@ -270,6 +287,19 @@ def _common(found: _core.mesh.SurfaceDiagnosis | _core.mesh.SolidDiagnosis) -> d
         "component": found.component,
         "euler": found.euler,
     }
+
+
+def _with_coincident(found: Diagnosis, V: NDArray[np.float64]) -> Diagnosis:
+    if found.n_components == 1 and found.genus.tolist() == [1]:
+        return found
+    order = np.lexsort(V.T)
+    same = (V[order[1:]] == V[order[:-1]]).all(axis=1)
+    ids = np.sort(order[1:][same]).astype(np.int32)
+    return replace(found, coincident=read_only(ids))
+
+
+def _listed(numbers: NDArray[Any]) -> str:
+    return ", ".join(map(str, numbers[:5].tolist())) + (", ..." if len(numbers) > 5 else "")
 
 
 def _count(n: int, what: str) -> str:

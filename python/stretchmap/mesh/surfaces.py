@@ -19,7 +19,7 @@ __all__ = ["TriMesh"]
 
 # Defects that leave a surface without a genus.
 _NO_GENUS = ("nonmanifold_edges", "nonmanifold_vertices", "border_edges", "not_orientable")
-_MOST_PAIRS = 1000  # of faces that cross: one does as much harm as all
+MOST_PAIRS = 1000  # of faces that cross: one does as much harm as all
 
 
 class TriMesh(Mesh):
@@ -139,7 +139,7 @@ class TriMesh(Mesh):
 
         Decided by exact tests.
         """
-        return read_only(_core.certificate.crossing_faces(self.V, self.F, _MOST_PAIRS))
+        return read_only(_core.certificate.crossing_faces(self.V, self.F, MOST_PAIRS))
 
     @property
     def n_components(self) -> int:

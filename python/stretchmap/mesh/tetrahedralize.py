@@ -14,13 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import describe
-from ..base.options import real
-from ..errors import MissingDependencyError, SelfIntersectionError, SolverError
+from ..base.options import memory, real
+from ..errors import MissingDependencyError, SolverError
+from .crossings import require_no_crossing
 from .flat_tets import opened
 from .given import as_surface
 from .meshes import TetMesh, TriMesh
 
 __all__ = ["tetrahedralize"]
+
+# Defects for which no filling could be one, whatever tetgen says about them.
+_IN_THE_WAY = (
+    "repeated", "duplicates", "nonmanifold_edges", "nonmanifold_vertices", "border_edges",
+    "not_orientable", "misoriented", "degenerate",
+)  # fmt: skip
+# Tets per volume asked for, and what each takes while tetgen works.
+_TETS_PER_VOLUME, _BYTES_PER_TET = 2.0, 300.0
 
 
 def tetrahedralize(
@@ -48,7 +57,10 @@ def tetrahedralize(
     MissingDependencyError
         If the ``tetgen`` package is not installed.
     OptionError
-        If ``max_volume`` or ``quality`` is out of range.
+        If ``max_volume`` or ``quality`` is out of range, or there is no memory for that many tets.
+    MeshError
+        If the surface has a border, is not manifold or not orientable, or has a face without area
+        or twice, see `TriMesh.diagnose`.
     SelfIntersectionError
         If the surface crosses itself; ``ids`` are the faces.
     SolverError
@@ -73,15 +85,20 @@ def tetrahedralize(
         raise MissingDependencyError(
             "filling a surface with tets needs tetgen: pip install 'stretchmap[mesh]'"
         )
-    options: dict[str, Any] = {"minratio": quality}
+    surface.diagnose().require(_IN_THE_WAY)
+    options: dict[str, Any] = {"minratio": quality, "steinerleft": -1}  # as many as it takes
     if max_volume is not None:
+        tets = _TETS_PER_VOLUME * abs(surface.volume) / max_volume
+        memory(f"about {tets:.3g} tets of that volume", _BYTES_PER_TET * tets)
         options |= {"fixedvolume": True, "maxvolume": max_volume}
     try:
         solid = TetMesh(*_run_tetgen(surface, options), orient=True)
         _require_same_surface(solid, surface)
         solid = opened(solid)
     except SolverError:
-        _require_no_crossing(surface)  # the reason, as a rule
+        require_no_crossing(  # the reason, as a rule
+            surface, "the surface", "repair it there, or let stretchmap prepare do so"
+        )
         raise
     return solid
 
@@ -111,16 +128,6 @@ def _require_same_surface(solid: TetMesh, surface: TriMesh) -> None:
     if len(lost) or n_found != len(surface.F):
         raise SolverError(
             f"filling the surface with tets replaced {describe('face', lost)} of it", lost.tolist()
-        )
-
-
-def _require_no_crossing(surface: TriMesh) -> None:
-    ids = np.unique(surface.crossing_faces)
-    if len(ids):
-        raise SelfIntersectionError(
-            f"the surface crosses itself at {describe('face', ids)} and cannot be filled with "
-            "tets; repair it there, or let stretchmap prepare do so",
-            ids.tolist(),
         )
 
 

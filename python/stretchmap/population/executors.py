@@ -15,7 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
 from ..base.options import shown, whole
-from ..errors import MissingDependencyError, OptionError, StretchmapError
+from ..errors import MissingDependencyError, OptionError, SolverError, StretchmapError
 
 __all__ = ["Dask", "Executor", "Processes", "Serial", "WorkerLost", "as_executor"]
 
@@ -110,6 +110,7 @@ class Processes:
         waiting = list(reversed(ids))
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(min(self.workers, len(waiting)), mp_context=context) as pool:
+            _require_started(pool)
             running: dict[Future[Any], int] = {}
             while (waiting or running) and not lost:
                 try:
@@ -220,6 +221,23 @@ def as_executor(executor: Any) -> Executor:
         "executor must be 'serial', 'processes', 'processes:N', 'dask://host:port', a Dask client "
         f"or an object with a method run(task, jobs), got {shown(executor)}"
     )
+
+
+def _require_started(pool: ProcessPoolExecutor) -> None:
+    """Each worker runs the main script once more, but for what its guard keeps from it.
+
+    Raises
+    ------
+    SolverError
+        One ends before it has done anything.
+    """
+    try:
+        pool.submit(os.getpid).result()
+    except BrokenProcessPool:
+        raise SolverError(
+            "worker processes end as they start: a script that asks for them has to make its calls "
+            "under `if __name__ == '__main__':`"
+        ) from None
 
 
 def _is_client(given: Any) -> bool:

@@ -65,11 +65,13 @@ class Similarity:
         ArrayError, NonFiniteError
             No such array.
         """
-        return np.asarray(self.factor * as_points(points, "points") @ self.rotation + self.shift)
+        return np.asarray(
+            self.factor * as_points(points, "points", or_none=True) @ self.rotation + self.shift
+        )
 
     def back(self, points: ArrayLike) -> Array:
         """Points (n, 3) moved back; as a call."""
-        away = as_points(points, "points") - self.shift
+        away = as_points(points, "points", or_none=True) - self.shift
         return np.asarray(away @ self.rotation.T / self.factor)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import read_only
 from ..base.files import atomic_path
-from ..base.options import as_path, callback, flag, one_of, real, whole
+from ..base.options import as_path, callback, flag, one_of, real, shown, whole
 from ..base.progress import Progress, report
 from ..errors import OptionError, SolverError, StretchmapError
 from ..io.npz import save_npz
@@ -104,7 +104,8 @@ def fit(
     Raises
     ------
     OptionError
-        An option out of range, names that are not unique, or a folder that holds another run.
+        An option out of range, names that are not unique, or a folder that holds another run or
+        the shapes.
     SolverError
         Fewer than two shapes could be mapped; the message has the first reason.
     CertificationError
@@ -133,6 +134,14 @@ def fit(
     callback("progress", progress)
     workers = as_executor(executor)
     shapes = gather_landmarks(gather_shapes(solids), landmarks)
+    if not shapes:
+        raise OptionError("no shapes are given; two are needed at least")
+    if folder is not None and isinstance(solids, (str, os.PathLike)):
+        if os.path.realpath(as_path(folder)) == os.path.realpath(as_path(solids)):
+            raise OptionError(
+                f"the run folder {shown(str(folder))} is that of the shapes: what a run leaves "
+                "would be taken for shapes; name another one"
+            )
     solid, marks = _start(shapes, template, landmarks)
     # Where all corners of a tet lie on the boundary only new vertices inside can keep it upright;
     # put in once they are in every map and in the mean.

@@ -19,6 +19,7 @@ from ..certificate.checks import certify
 from ..certificate.findings import Certificate, require_certified
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..maps.result import MapResult
+from ..mesh.crossings import UNLESS_KEPT, require_no_crossing
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
@@ -135,7 +136,8 @@ def fill(
     OrientationError
         The boundary image is inside out.
     SelfIntersectionError
-        It crosses itself; ``ids`` are pairs of boundary faces (``solid.surface.F``).
+        It crosses itself; ``ids`` are pairs of boundary faces (``solid.surface.F``). Or the
+        boundary of the solid does.
     MeshError
         The solid has a defect, see `TetMesh.diagnose`, or a cavity.
     DegenerateError
@@ -172,6 +174,8 @@ def fill(
         )
     options = FillOptions() if options is None else options
     instance("options", options, FillOptions, "FillOptions(...)")
+    if not keep_best:
+        require_no_crossing(solid.surface, "the boundary of the solid", UNLESS_KEPT)
     result = filled(solid, points, options, progress)
     if not keep_best:
         require_certified(result.certificate, "the map")

@@ -17,6 +17,7 @@ from ..base.torus import Torus
 from ..certificate.findings import require_certified
 from ..errors import KindError, OptionError
 from ..maps.result import MapResult
+from ..mesh.crossings import UNLESS_KEPT, require_no_crossing
 from ..mesh.given import as_solid, require_same_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .boundary_starts import boundary_starts
@@ -111,6 +112,8 @@ def volume_map(
     ------
     MeshError
         The mesh is not a solid torus, see `TetMesh.require_solid_torus`.
+    SelfIntersectionError
+        Certified route without ``keep_best``: the boundary of the solid crosses itself.
     DegenerateError
         ``refine=False`` and some interior edge or face cannot be repaired; ``ids`` are the tets.
     CertificationError
@@ -181,6 +184,8 @@ def volume_map(
             solid.n_tets, method, solid.n_tets * _BYTES_PER_TET[method] / 2**30,
         )  # fmt: skip
     solid.require_solid_torus()
+    if method == "certified" and not keep_best:
+        require_no_crossing(solid.surface, "the boundary of the solid", UNLESS_KEPT)
     if start is not None:
         instance("start", start, MapResult, "a map of this solid; for an image see optimizer")
         start = _of_the_input(solid, start, progress)

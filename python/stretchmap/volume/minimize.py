@@ -44,6 +44,7 @@ _FAIR = 5e-3
 # SD of the tets' ratios with which volumes are right: only tori and the like come so far, and what
 # is gained from there on is paid with shapes and with most of the steps.
 _RIGHT = 1e-4
+_ROUNDING = 1e-14  # of an energy that is 0 where nothing is distorted
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,6 +243,8 @@ def minimize(
             if step.alpha >= _SERVED:
                 weight = grown(weight, step.alpha, o.growth, goal)
             elif step.alpha == 0.0:
+                if 0.5 * step.decrement <= _ROUNDING * weight:
+                    return Minimized(x, True, "the energy is at its least", newton)
                 return Minimized(
                     x, False, f"no step lowers the energy at lambda = {weight:g}", newton
                 )

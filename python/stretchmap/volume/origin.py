@@ -63,7 +63,7 @@ class Origin:
 
     def coordinates(self, given: ArrayLike) -> NDArray[np.float64]:
         """Coordinates (n, 3) of the map from this origin on, angles in [0, 2 pi)."""
-        uvs = as_points(given, "given")
+        uvs = as_points(given, "given", or_none=True)
         angles = self.sign * (uvs[:, :2] - [self.u, self.v])
         return np.column_stack([np.mod(angles, TWO_PI), uvs[:, 2]])
 
@@ -139,5 +139,9 @@ def _by_landmarks(result: MapResult, landmarks: ArrayLike) -> Origin:
     outside = np.flatnonzero(~np.isfinite(found[:, 0]))
     if len(outside):
         raise LandmarkError("a landmark lies outside the solid", outside)
+    if np.array_equal(points[0], points[1]):
+        raise LandmarkError(
+            "the two landmarks are the same point, so they tell no direction", [0, 1]
+        )
     ahead = np.mod(found[1, 0] - found[0, 0], TWO_PI) < np.pi
     return Origin(float(found[0, 0]), float(found[0, 1]), 1 if ahead else -1, (1.0, 1.0, 1.0))

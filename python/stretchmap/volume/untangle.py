@@ -63,8 +63,8 @@ _FEW_PATIENCE = 4
 # served better by patches.
 MOST_STUCK, _HASTY_PATIENCE = 0.05, 10
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
-# Times the volume a tet may expect: what is that large, or inverted to that size, holds up all steps
-# for the whole, whose energy it is.
+# Times the volume a tet may expect: what is that large, or inverted to that size, has most of the
+# energy and holds up all steps for the whole.
 _FAR = 100.0
 # Steps in a row, none longer than that and none with fewer inverted elements than there had been:
 # a few of them are so far off that all others wait for them.

@@ -164,8 +164,8 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
 def _bring_near(run: Run) -> None:
     """What is far too large for where it is, brought down to that by itself, all else held.
 
-    Where a boundary image squeezes a limb within a few edges, the harmonic map sees the body outside
-    farther into it than there is room.
+    Where a boundary image squeezes a limb within a few edges, the body outside reaches farther into
+    it in the harmonic map than there is room.
     """
     model = run.history.model
     far = far_tets(model, run.x)

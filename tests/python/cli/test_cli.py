@@ -323,6 +323,13 @@ def test_info_lists_every_defect_and_reads_what_cannot_be_mapped(folder, capsys)
     assert "can be mapped to the torus: no" in out
     assert main(["info", "solid.npz"]) == 0
     assert "can be mapped to the torus: yes" in capsys.readouterr().out
+    angle = 2.0 * np.arctan2(V[:, 1], V[:, 0])
+    far = np.hypot(V[:, 0], V[:, 1])
+    np.savez(
+        "twice.npz", V=np.column_stack([far * np.cos(angle), far * np.sin(angle), V[:, 2]]), F=F
+    )
+    assert main(["info", "twice.npz", "--orient"]) == 0
+    assert "to the torus: no, the surface touches or crosses itself at" in capsys.readouterr().out
 
 
 def test_homology_of_any_genus(folder, capsys):
@@ -438,7 +445,8 @@ def test_the_package_run_as_a_module_is_the_command(folder):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-def test_interrupting_exits_130_at_once_without_traceback(tmp_path):
+@pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_interrupting_exits_130_at_once_without_traceback(tmp_path, how):
     sm.write(tmp_path / "big.npz", samples.vertebra_like(120_000))
     run = subprocess.Popen(
         [sys.executable, "-m", "stretchmap", "volume", "big.npz", "-o", "map.npz"],
@@ -450,7 +458,7 @@ def test_interrupting_exits_130_at_once_without_traceback(tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     time.sleep(2.0)
-    run.send_signal(signal.SIGINT)
+    run.send_signal(getattr(signal, how))
     sent = time.perf_counter()
     _, err = run.communicate(timeout=60)
     assert run.returncode == 130, err

@@ -132,6 +132,14 @@ def test_a_million_points_take_seconds():
     assert time.perf_counter() - start < 20.0
 
 
+def test_no_queries_have_no_answers(bumpy_map):
+    for none in ([], np.zeros((0, 3))):
+        assert bumpy_map.forward(none).shape == bumpy_map.inverse(none).shape == (0, 3)
+        found = PointMap(bumpy_map).forward(none)
+        assert found.inside.shape == (0,) and found.weights.shape == (0, 4)
+        assert bumpy_map.coordinates(none).shape == (0, 3)
+
+
 def test_bad_input_is_named(bumpy_map):
     broken = bumpy_map.image.copy()
     broken[7] = np.nan

@@ -35,6 +35,12 @@ def given(result: sm.VolumeMap) -> tuple[dict[str, np.ndarray], dict[str, np.nda
     )
 
 
+def test_fields_named_like_those_of_a_map_are_left_out_aloud(coarse, caplog):
+    carried = coarse.with_fields({"u": coarse.mesh.V[:, 0], "load": coarse.mesh.V[:, 1]})
+    assert set(carried.point_fields) == {"load"}
+    assert "left out: u; give them other names" in caplog.text
+
+
 def test_added_vertices_and_tets_inherit(coarse):
     points, cells = given(coarse)
     carried = coarse.with_fields(points, cells)

@@ -27,6 +27,12 @@ def torus_grid(nu, nv, torus):
     return TriMesh(torus.xi(*angles.T), F), angles
 
 
+def test_an_image_beyond_all_sizes_is_refused():
+    solid = samples.solid_torus(600)
+    with pytest.raises(ArrayError, match="beyond"):
+        distortion(solid, 1e60 * solid.V)
+
+
 @pytest.fixture
 def rng():
     return np.random.default_rng(3)

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import shapes
-from stretchmap import _core
+from stretchmap import _core, samples
 from stretchmap.errors import (
     ConnectivityError,
     GenusError,
@@ -390,3 +390,31 @@ def test_meshes_on_disk_have_no_defects(name, load_solid):
     solid.require_solid_torus()
     solid.surface.require_genus_one()
     assert solid.surface.volume == pytest.approx(solid.volume, rel=1e-12)
+
+
+def test_vertices_that_should_be_welded_are_named():
+    solid = samples.bumpy_torus(1200)
+    single = TetMesh(solid.V[solid.T].reshape(-1, 3), np.arange(4 * solid.n_tets).reshape(-1, 4))
+    with pytest.raises(ConnectivityError, match="exactly where others are: weld them first"):
+        single.require_solid_torus()
+    assert len(single.diagnose().summary()) < 2000
+    # A seam: the vertices of one cut plane twice.
+    ahead = solid.V[solid.T].mean(axis=1)[:, 1] > 0.0
+    on = np.isin(np.arange(solid.n_vertices), solid.T[ahead]) & np.isin(
+        np.arange(solid.n_vertices), solid.T[~ahead]
+    )
+    seam = np.flatnonzero(on & (solid.V[:, 0] > 0.0))
+    T = solid.T.copy()
+    copies = np.arange(solid.n_vertices)
+    copies[seam] = solid.n_vertices + np.arange(len(seam))
+    T[ahead] = copies[T[ahead]]
+    cut = TetMesh(np.vstack([solid.V, solid.V[seam]]), T)
+    found = cut.diagnose()
+    assert found.ok and len(found.coincident) == len(seam) and "weld" in found.summary()
+    with pytest.raises(GenusError, match=r"no hole; .*weld them first"):
+        cut.require_solid_torus()
+    open_surface = TriMesh(solid.surface.V[solid.surface.F].reshape(-1, 3),
+                           np.arange(3 * solid.surface.n_faces).reshape(-1, 3))  # fmt: skip
+    with pytest.raises(OpenSurfaceError, match="weld"):
+        open_surface.diagnose().require()
+    assert not len(solid.diagnose().coincident)

@@ -250,6 +250,23 @@ def test_surfaces_in_the_folder_are_named_not_passed_over(tmp_path, bones, caplo
     assert "scan4.ply and 2 more left out" in told and "notes" not in told
 
 
+def test_a_script_without_a_guard_is_told_of_it_at_once(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import stretchmap as sm\n"
+        "print('run', flush=True)\n"
+        "solids = [sm.samples.solid_torus(600, R=R) for R in (2.0, 2.1, 2.2)]\n"
+        "sm.population.fit(solids, executor='processes:2', max_rounds=1)\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+    )  # fmt: skip
+    assert done.returncode == 1 and "under `if __name__ == '__main__':`" in done.stderr
+    assert done.stdout.count("run") <= 3  # itself and its workers, once each
+
+
 def test_what_is_skipped_is_told_once(folder, caplog):
     found = sm.population.fit(folder, max_rounds=2, tol=0.0)
     assert len(found.moved) == 2 and set(found.skipped) == {"bad"}
@@ -265,6 +282,10 @@ def test_runs_that_cannot_be(serial, folder, bones):
         sm.population.fit(bones.solids[:1])
     with pytest.raises(SolverError, match="no shape can be read"):
         sm.population.fit([Path("nowhere.npz"), Path("nothing.npz")])
+    with pytest.raises(OptionError, match="no shapes are given"):
+        sm.population.fit({})
+    with pytest.raises(OptionError, match="name another one"):
+        sm.population.fit(folder, folder=folder / ".." / folder.name)
     for options in (
         {"along": "both"}, {"tol": -1.0}, {"max_rounds": 0}, {"executor": "cloud"}, {"scale": 1},
         {"volume_weight": 0.0}, {"executor": "processes:x"},

@@ -7,7 +7,9 @@ import pytest
 
 from stretchmap import TetMesh, TriMesh, samples
 from stretchmap.errors import (
+    DegenerateError,
     MissingDependencyError,
+    OpenSurfaceError,
     OptionError,
     SelfIntersectionError,
     SolverError,
@@ -176,6 +178,26 @@ def test_tetrahedralize_refuses_a_surface_that_crosses_itself():
         samples.tetrahedralize(TriMesh(V, surface.F))
     assert np.isin(0, surface.F[list(caught.value.ids)])
     assert set(caught.value.ids) <= set(range(surface.n_faces))
+
+
+def test_tetrahedralize_names_what_is_wrong_with_a_surface():
+    pytest.importorskip("tetgen")
+    surface = samples.torus_surface(30, 12)
+    with pytest.raises(OpenSurfaceError, match="on a border"):
+        samples.tetrahedralize(TriMesh(surface.V, surface.F[1:]))
+    with pytest.raises(DegenerateError, match="second copy"):
+        samples.tetrahedralize(TriMesh(surface.V, np.vstack([surface.F, surface.F[:1]])))
+
+
+def test_tetrahedralize_makes_as_many_tets_as_their_volume_asks_for():
+    pytest.importorskip("tetgen")
+    surface = samples.torus_surface(30, 12)
+    volume = surface.volume / 1e6
+    solid = samples.tetrahedralize(surface, max_volume=volume)
+    assert solid.n_vertices > 110_000  # where tetgen ends if it is not told otherwise
+    assert np.mean(solid.tet_volumes > volume) < 0.1  # those by the surface, which is not refined
+    with pytest.raises(OptionError, match="GiB"):
+        samples.tetrahedralize(surface, max_volume=1e-9 * volume)
 
 
 def test_tetrahedralize_says_what_it_could_not_keep():

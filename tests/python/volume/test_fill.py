@@ -115,6 +115,13 @@ def test_a_limb_squeezed_by_orders_of_magnitude(ball, power):
     assert result.converged
 
 
+@pytest.mark.parametrize("solid", [samples.solid_double_torus(2), samples.solid_torus(900)])
+def test_a_boundary_left_where_it_is_leaves_nothing_to_do(solid):
+    result = sm.fill(solid, 2.0 * solid.surface.V)
+    assert result.converged and result.stop_reason == "the energy is at its least"
+    np.testing.assert_allclose(result.image, 2.0 * result.solid.V, atol=1e-12)
+
+
 def test_a_cap_squeezed_at_once_does_not_hold_up_all_the_rest(ball):
     """The harmonic map sees the body outside far into it; that is mended where it is."""
     V = ball.surface.V / np.linalg.norm(ball.surface.V, axis=1)[:, None]

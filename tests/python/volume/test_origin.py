@@ -114,3 +114,5 @@ def test_landmarks_that_decide_nothing_are_named(found):
     with pytest.raises(LandmarkError) as caught:
         sm.origin_of(found, np.array([found.mesh.V[0], [1e3, 0.0, 0.0]]))
     assert 1 in caught.value.ids
+    with pytest.raises(LandmarkError, match="the same point"):
+        sm.origin_of(found, found.mesh.V[[5, 5]])

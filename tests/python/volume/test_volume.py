@@ -15,7 +15,7 @@ from scipy.sparse.linalg import spsolve
 import stretchmap as sm
 from shapes import mug
 from stretchmap import _core, samples
-from stretchmap.errors import DegenerateError, KindError, OptionError
+from stretchmap.errors import DegenerateError, KindError, OptionError, SelfIntersectionError
 from stretchmap.mesh.meshes import TetMesh
 from stretchmap.volume import vsem
 
@@ -371,6 +371,18 @@ def test_bad_options_are_named(bumpy, options):
         sm.volume_map(bumpy, **options)
 
 
+def test_a_solid_that_crosses_itself_is_refused_before_the_work(bumpy):
+    angle, far = 2.0 * np.arctan2(bumpy.V[:, 1], bumpy.V[:, 0]), np.hypot(*bumpy.V[:, :2].T)
+    V = np.column_stack([far * np.cos(angle), far * np.sin(angle), bumpy.V[:, 2]])
+    twice, steps = TetMesh(V, bumpy.T), []
+    with pytest.raises(SelfIntersectionError, match="keep_best=True") as caught:
+        sm.volume_map(twice, progress=lambda *a, **k: steps.append(a))
+    assert not steps and np.isin(caught.value.ids, np.arange(twice.surface.n_faces)).all()
+    with pytest.raises(SelfIntersectionError, match="boundary of the solid"):
+        sm.fill(twice, bumpy.surface.V)
+    assert sm.fill(twice, bumpy.surface.V, keep_best=True).distortion.flips == 0
+
+
 def test_a_start_of_another_mesh_is_refused(bumpy):
     other = sm.area_map(samples.torus_surface(12, 8))
     with pytest.raises(KindError, match="of another surface"):
@@ -381,6 +393,8 @@ def test_a_start_of_another_mesh_is_refused(bumpy):
     ("name", "value"),
     [
         ("floor", 2.0),
+        ("phase", 1e300),
+        ("tol", 5.0),
         ("patience", 0),
         ("untangle_iter", 1.5),
         ("time_limit", float("inf")),

@@ -1,0 +1,39 @@
+"""Surfaces that cross themselves bound nothing that could be mapped."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import describe
+from ..errors import SelfIntersectionError
+from .surfaces import MOST_PAIRS, TriMesh
+
+__all__ = ["UNLESS_KEPT", "require_no_crossing"]
+
+# The remedy where a map of it could be made, but not be proven one to one.
+UNLESS_KEPT = "repair it there, or see with keep_best=True how far a map gets all the same"
+
+
+def require_no_crossing(surface: TriMesh, what: str, remedy: str) -> None:
+    """Raise where faces meet beyond the vertices they share, by exact tests.
+
+    Parameters
+    ----------
+    surface : TriMesh
+    what : str
+        What it is, for the message.
+    remedy : str
+
+    Raises
+    ------
+    SelfIntersectionError
+        ``ids`` are the faces, of the first thousand pairs.
+    """
+    pairs = surface.crossing_faces
+    if len(pairs):
+        ids = np.unique(pairs)
+        more = "at least " if len(pairs) == MOST_PAIRS else ""
+        raise SelfIntersectionError(
+            f"{what} touches or crosses itself at {more}{describe('face', ids)}; {remedy}",
+            ids.tolist(),
+        )
