@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
 from ..base.arrays import read_only
 from ..errors import SelfIntersectionError
 from ..forms.harmonic import solve_harmonic
 from ..mesh.given import as_solid, as_surface
 from .bounding import bounding_by_linking, bounding_in, least_skew_longitude, same_lattice
+from .generators import generators_of
 from .integer import integer_inverse, reduced_basis
 from .loops import HomologyBasis
 
@@ -69,11 +69,7 @@ def homology_basis(surface: TriMesh, solid: TetMesh | None = None) -> HomologyBa
     if solid is not None:
         solid = as_solid(solid)
     surface.require_closed()
-    top = surface.topology
-    lists, forms = _core.homology.tree_cotree(top, _core.mesh.edge_lengths(top, surface.V))
-    loops = [np.array(loop, dtype=np.int32) for loop in lists]
-    wedge = np.rint(_core.homology.wedge_matrix(top, forms.astype(float))).astype(np.int64)
-    intersection = integer_inverse(wedge).T
+    loops, forms, intersection = generators_of(surface)
     harmonic = solve_harmonic(surface, forms)
 
     within = None if solid is None else bounding_in(solid, surface, loops)

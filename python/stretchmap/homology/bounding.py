@@ -10,12 +10,20 @@ from numpy.typing import NDArray
 from .. import _core
 from ..errors import GenusError, SelfIntersectionError
 from ..mesh.given import require_same_mesh
+from ..mesh.meshes import TriMesh
+from .generators import generators_of
 from .integer import complement, integer_inverse, integer_kernel
 
 if TYPE_CHECKING:
-    from ..mesh.meshes import TetMesh, TriMesh
+    from ..mesh.meshes import TetMesh
 
-__all__ = ["bounding_by_linking", "bounding_in", "least_skew_longitude", "same_lattice"]
+__all__ = [
+    "bounding_by_linking",
+    "bounding_in",
+    "least_skew_longitude",
+    "require_bounding_alike",
+    "same_lattice",
+]
 
 
 def bounding_by_linking(
@@ -66,6 +74,34 @@ def same_lattice(first: NDArray[np.int64], second: NDArray[np.int64]) -> bool:
     """Whether two gapless lattices of equal dimension are the same."""
     rank = int(np.linalg.matrix_rank(np.vstack([first, second])))
     return rank == len(first) == len(second)
+
+
+def require_bounding_alike(solid: TetMesh, image: NDArray[np.float64]) -> None:
+    """Raise where what bounds in a solid does not bound behind an image of its boundary.
+
+    Parameters
+    ----------
+    solid : TetMesh
+    image : ndarray, shape (nb, 3)
+        Of its boundary vertices, embedded.
+
+    Raises
+    ------
+    GenusError
+        Then no map of the inside is continuous.
+    """
+    surface = solid.surface
+    if surface.euler == 2:
+        return
+    loops, _, intersection = generators_of(surface)
+    within = bounding_in(solid, surface, loops)
+    behind = bounding_by_linking(TriMesh(image, surface.F), loops, intersection)[1]
+    if not same_lattice(within, behind):
+        raise GenusError(
+            "the boundary image turns the solid inside out: loops that bound inside of the solid, "
+            "such as meridians, do not bound behind the image, so no map of the inside is "
+            "continuous; has the image its faces in another order, or are two angles exchanged?"
+        )
 
 
 def least_skew_longitude(

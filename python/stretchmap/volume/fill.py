@@ -18,6 +18,7 @@ from ..base.threads import takes_threads
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate, require_certified
 from ..errors import ArrayError, GenusError, SelfIntersectionError
+from ..homology.bounding import require_bounding_alike
 from ..maps.result import MapResult
 from ..mesh.crossings import UNLESS_KEPT, require_no_crossing
 from ..mesh.given import as_solid
@@ -138,6 +139,9 @@ def fill(
     SelfIntersectionError
         It crosses itself; ``ids`` are pairs of boundary faces (``solid.surface.F``). Or the
         boundary of the solid does.
+    GenusError
+        What bounds in the solid, as meridians do, does not bound behind the image; without
+        ``keep_best``.
     MeshError
         The solid has a defect, see `TetMesh.diagnose`, or a cavity.
     DegenerateError
@@ -176,7 +180,7 @@ def fill(
     instance("options", options, FillOptions, "FillOptions(...)")
     if not keep_best:
         require_no_crossing(solid.surface, "the boundary of the solid", UNLESS_KEPT)
-    result = filled(solid, points, options, progress)
+    result = filled(solid, points, options, progress, anyway=keep_best)
     if not keep_best:
         require_certified(result.certificate, "the map")
     return result
@@ -187,8 +191,10 @@ def filled(
     points: NDArray[np.float64],
     options: FillOptions,
     progress: Progress | None = None,
+    *,
+    anyway: bool = False,
 ) -> FillMap:
-    """`fill` of checked arguments; the map may be uncertified."""
+    """`fill` of checked arguments, even ``anyway`` where no map can be one to one."""
     clock = time.perf_counter()
     problem = VolumeProblem.of(solid, points, refine=options.refine)
     crossing = _core.certificate.crossing_faces(points, solid.surface.F, _MOST_PAIRS)
@@ -198,6 +204,8 @@ def filled(
             "map of the inside can be one to one",
             crossing.ravel(),
         )
+    if not anyway:
+        require_bounding_alike(solid, points)
     seconds = {"check": time.perf_counter() - clock}
     outcome = solve(problem, options, progress=progress)
     return _result(outcome, solid, points, seconds)

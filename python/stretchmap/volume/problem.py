@@ -120,9 +120,13 @@ class VolumeProblem:
         boundary = image[ids] if warm else image
         enclosed = float(_core.mesh.enclosed_volume(boundary, solid.surface.F))
         if not enclosed > 0.0:
+            remedy = "mirror it, or reverse the order of its faces"
+            if torus is not None:
+                remedy = (
+                    "mirror it or, if the torus is too thin for so few faces, ask for a smaller R/r"
+                )
             raise OrientationError(
-                "the boundary image is inside out, or encloses no volume: mirror it, or reverse "
-                "the order of its faces"
+                f"the boundary image is inside out, or encloses no volume: {remedy}"
             )
         length = enclosed ** (1.0 / 3.0)
         center = np.zeros(3) if torus is not None else boundary.mean(axis=0)

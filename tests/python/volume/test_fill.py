@@ -122,6 +122,13 @@ def test_a_boundary_left_where_it_is_leaves_nothing_to_do(solid):
     np.testing.assert_allclose(result.image, 2.0 * result.solid.V, atol=1e-12)
 
 
+def test_one_handle_may_take_the_place_of_another():
+    double = samples.solid_double_torus(2)
+    center = 0.5 * (double.V.min(axis=0) + double.V.max(axis=0))
+    half_turn = (double.surface.V - center) * [-1.0, -1.0, 1.0]
+    check(double, half_turn, sm.fill(double, half_turn))
+
+
 def test_a_cap_squeezed_at_once_does_not_hold_up_all_the_rest(ball):
     """The harmonic map sees the body outside far into it; that is mended where it is."""
     V = ball.surface.V / np.linalg.norm(ball.surface.V, axis=1)[:, None]
@@ -216,7 +223,7 @@ def test_tets_the_boundary_decides_about_are_named_or_split():
     assert result.extra_arrays()["parent_tet"].max() == 1
 
 
-def test_what_no_map_can_follow_is_refused_or_kept():
+def test_what_no_map_can_follow_is_refused_or_kept(monkeypatch):
     """A boundary twisted once along the meridian of a solid torus extends; a swap of meridian and
     longitude does not."""
     from stretchmap.base.torus import Torus
@@ -227,8 +234,13 @@ def test_what_no_map_can_follow_is_refused_or_kept():
     twisted = torus.xi(u, v + u)
     check(solid, twisted, sm.fill(solid, twisted))
     swapped = Torus(3.0, 1.0).xi(-v, u)
+    steps = []
+    with pytest.raises(GenusError, match="turns the solid inside out"):
+        sm.fill(solid, swapped, progress=lambda *a, **k: steps.append(a))
+    assert not steps
+    kept = sm.fill(solid, swapped, keep_best=True)
+    assert not kept.certificate.certified and not kept.converged and kept.distortion.flips > 0
+    monkeypatch.setattr("stretchmap.volume.fill.require_bounding_alike", lambda *arguments: None)
     with pytest.raises(CertificationError, match="keep_best") as caught:
         sm.fill(solid, swapped)
     assert caught.value.ids
-    kept = sm.fill(solid, swapped, keep_best=True)
-    assert not kept.certificate.certified and not kept.converged and kept.distortion.flips > 0

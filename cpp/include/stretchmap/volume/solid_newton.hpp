@@ -25,7 +25,7 @@ struct NewtonOptions {
 struct NewtonReport {
   EnergyReport before, after;
   double decrement = 0.0;  // -gradient . step, twice the decrease a quadratic model predicts
-  double alpha = 0.0;  // step length taken, 0 if no decrease was found
+  double alpha = 0.0;      // step length taken, 0 if no decrease was found
   int cg_iterations = 0;
   double cg_residual = 0.0;
   bool negative_curvature = false;  // met by the conjugate gradients, which then stopped early
