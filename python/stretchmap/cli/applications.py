@@ -290,6 +290,8 @@ def _shares(entry: str) -> int | list[float]:
         raise OptionError(f"--fractions must hold numbers, got {entry!r}") from None
     if not all(map(math.isfinite, values)):
         raise OptionError(f"--fractions must hold finite numbers, got {entry!r}")
-    if len(values) == 1 and values[0] == int(values[0]):
+    if len(values) == 1:
+        if values[0] != int(values[0]):
+            raise OptionError(f"--fractions takes a whole number of parts, or shares, got {entry}")
         return int(values[0])
     return values

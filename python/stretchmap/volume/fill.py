@@ -199,8 +199,10 @@ def filled(
     problem = VolumeProblem.of(solid, points, refine=options.refine)
     crossing = _core.certificate.crossing_faces(points, solid.surface.F, _MOST_PAIRS)
     if len(crossing):
+        more = "at least " if len(crossing) == _MOST_PAIRS else ""
         raise SelfIntersectionError(
-            f"the boundary image touches or crosses itself: {describe('face pair', crossing)}; no "
+            f"the boundary image touches or crosses itself: {more}"
+            f"{describe('face pair', crossing)}; no "
             "map of the inside can be one to one",
             crossing.ravel(),
         )

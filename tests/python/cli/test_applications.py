@@ -138,6 +138,7 @@ def test_register_command_takes_how_far_landmarks_may_be_off(folder, capsys):
         ("# ids\na,b\n\n1,2\n3,4,5,6,7,8\n", "line 5: 6 entries, but 2 before"),
         ("1,nan\n", "line 1: 'nan' is not a finite number"),
         ("1,1e400\n", "line 1: '1e400' is not a finite number"),
+        ("1,2_0\n", "line 1: '2_0' is not a finite number"),
         ("1.5,2\n", "whole numbers"),
         ("99999999,0\n", "names no vertex"),
         ("\xff", "not a readable CSV file"),
