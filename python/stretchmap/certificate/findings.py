@@ -41,7 +41,7 @@ class Certificate(HasSummary):
         ``smallest_volume`` (of an image tet, relative to the mean).
     ids : dict of str to tuple of int
         Elements at fault, by check: tets for the volumes, boundary faces for the boundary (flat
-        list of pairs for crossings), at most 1000 of each.
+        list of pairs for crossings), at most 1000 of each; first those of ``reason``.
 
     Examples
     --------
@@ -79,12 +79,14 @@ class Findings:
         self.quantities: dict[str, float] = {}
         self.ids: dict[str, tuple[int, ...]] = {}
         self.reason = ""
+        self.decisive = ""  # the check the reason is of
 
     def note(self, name: str, passed: bool, reason: str = "", ids: ArrayLike = ()) -> bool:
         self.checks[name] = bool(passed)
         if not passed:
             self.ids[name] = tuple(np.asarray(ids, int).ravel()[: 2 * MOST_IDS].tolist())
-            self.reason = self.reason or reason
+            if reason and not self.reason:
+                self.reason, self.decisive = reason, name
         return bool(passed)
 
     def certificate(self, proof: str) -> Certificate:
@@ -93,7 +95,7 @@ class Findings:
             reason=self.reason or proof,
             checks=self.checks,
             quantities=self.quantities,
-            ids=self.ids,
+            ids={k: self.ids[k] for k in sorted(self.ids, key=lambda k: k != self.decisive)},
         )
 
 

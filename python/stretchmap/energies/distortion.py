@@ -94,7 +94,7 @@ class DistortionEnergy(Energy):
         if weights is None:
             self._factors = np.asarray(self.mesh.tet_volumes / self.mesh.volume)
         else:
-            self._factors = as_reals(weights, "weights", (self.mesh.n_tets,))
+            self._factors = np.array(as_reals(weights, "weights", (self.mesh.n_tets,)))
             if not (self._factors > 0.0).all():
                 raise OptionError("weights must be positive")
         self._projected = flag("projected", projected)

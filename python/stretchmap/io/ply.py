@@ -8,7 +8,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FileFormatError
+from ..base.options import shown
+from ..errors import ArrayError, FileFormatError
 from .arrays import MeshArrays, fans
 from .ply_rows import Bytes, Words
 
@@ -22,8 +23,7 @@ _NAMES = {
     "f4": "float", "f8": "double",
 }  # fmt: skip
 _ORDERS = {b"binary_little_endian": "<", b"binary_big_endian": ">", b"ascii": ""}
-
-
+_AXES = ("x", "y", "z")
 # Of a list of property names, the corners of faces.
 _CORNERS = ("vertex_indices", "vertex_index")
 
@@ -69,7 +69,7 @@ def read_ply(data: bytes) -> MeshArrays:
     else:
         faces = fans(corners.entries, corners.sizes)
         cell_data = {k: np.repeat(a, corners.sizes - 2, axis=0) for k, a in cell_data.items()}
-    point_data = {k: a for k, a in _scalars(vertex).items() if k not in "xyz"}
+    point_data = {k: a for k, a in _scalars(vertex).items() if k not in _AXES}
     return MeshArrays(points, F=faces, point_data=point_data, cell_data=cell_data)
 
 
@@ -196,9 +196,22 @@ def _uneven_table(element: _Element, source: Words | Bytes, at: int) -> tuple[_T
 
 
 def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:
-    """Write a binary PLY with every point and cell array as scalar properties."""
-    points = {axis: mesh.V[:, k] for k, axis in enumerate("xyz")} | _columns(mesh.point_data)
-    cells = _columns(mesh.cell_data)
+    """Write a binary PLY with every point and cell array as scalar properties.
+
+    Raises
+    ------
+    ArrayError
+        The name of an array is one that PLY has for the mesh, or not of ASCII characters.
+    """
+    columns, cells = _columns(mesh.point_data), _columns(mesh.cell_data)
+    for name in (*columns, *cells):
+        taken = _AXES if name in columns else ("#", *_CORNERS)
+        if name in taken or not name.isascii():
+            raise ArrayError(
+                f"an array named {shown(name)} cannot be written to .ply, whose names are of ASCII "
+                f"characters and other than {', '.join((*_AXES, *_CORNERS))}; rename it"
+            )
+    points = {axis: mesh.V[:, k] for k, axis in enumerate(_AXES)} | columns
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.V)}"]
     lines += [f"property {_NAMES[a.dtype.str[1:]]} {name}" for name, a in points.items()]
     lines += [f"element face {len(mesh.elements)}", "property list uchar int vertex_indices"]

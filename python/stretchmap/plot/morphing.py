@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from contextlib import ExitStack
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -127,14 +127,18 @@ class Morph(HasSummary):
             for t, frame in zip(self.times, frames, strict=True)
         ]
         text = _COLLECTION.format("\n".join(lines))
-        with ExitStack() as stack:
-            # The frames appear together, once all of them are written.
+        # The frames appear together, once all of them are written, and what names them last.
+        beside = path.absolute().parent
+        with tempfile.TemporaryDirectory(prefix=".stretchmap-", dir=beside) as place:
             for i, frame in enumerate(frames):
-                temporary = stack.enter_context(atomic_path(frame))
                 solid = TetMesh(self.frame(i), self.solid.T)
-                io.write(temporary, solid, self.fields.point_data, self.fields.cell_data)
-            with atomic_path(path) as temporary:
-                temporary.write_text(text, encoding="utf-8")
+                io.write(
+                    Path(place, frame.name), solid, self.fields.point_data, self.fields.cell_data
+                )
+            for frame in frames:
+                os.replace(Path(place, frame.name), frame)
+        with atomic_path(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
         return [*frames, path]
 
     def picture(self, count: int = 4) -> Figure:

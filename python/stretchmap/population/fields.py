@@ -10,7 +10,7 @@ import numpy as np
 import scipy.stats
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import read_only
+from ..base.arrays import as_reals, read_only
 from ..base.options import instance, one_of, real, shown
 from ..errors import ArrayError, MissingDependencyError, OptionError
 from ..maps.files import LoadedMap
@@ -117,6 +117,7 @@ def carry_field(
     places = {shape.name: shape for shape in population.shapes}
     if name not in places:
         raise OptionError(f"where the shape {name!r} came from is not known; take a result of fit")
+    values = as_reals(values, "values", (None,))
     solid = places[name].load()
     laid, parent = _laid(population, name)
     between = LoadedMap(

@@ -25,6 +25,7 @@ from .measures import ModelMeasures, measure_model
 from .outliers import modified_z_scores
 from .shape_model import ShapeModel
 from .shapes import Shape
+from .task import map_file
 
 __all__ = ["Population"]
 
@@ -184,7 +185,7 @@ class Population(HasSummary):
         one_of("name", name, self.names)
         if self.folder is None:
             raise OptionError("no maps were kept; name a run folder, fit(..., folder='run')")
-        return load_map(self.folder / "maps" / f"{name}.npz")
+        return load_map(map_file(self.folder, name, len(self.moved) - 1))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything scalar, ready for JSON."""

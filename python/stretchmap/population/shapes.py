@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..base.arrays import as_reals
 from ..base.files import open_to_read
 from ..base.options import as_path
-from ..errors import ArrayError, LandmarkError, OptionError
+from ..errors import ArrayError, FileFormatError, LandmarkError, OptionError
 from ..io.formats import suffixes
 from ..io.numbers import read_numbers
 from ..io.reading import read_solid
@@ -81,8 +81,8 @@ class Shape:
                     with open_to_read(part) as file:
                         while chunk := file.read(1 << 20):
                             found.update(chunk)
-                except OSError as error:  # told when it is to be read
-                    found.update(str(error.errno).encode())
+                except (OSError, FileFormatError) as error:  # told when it is to be read
+                    found.update(str(error).encode())
             elif part is not None:
                 arrays = (part.V, part.T) if isinstance(part, TetMesh) else (part,)
                 for array in arrays:
@@ -123,7 +123,11 @@ def gather_shapes(solids: Any) -> list[Shape]:
             f"{type(solids).__name__}"
         )
     width = len(str(max(len(solids) - 1, 0)))
-    return _checked([_shape(entry, f"{i:0{width}d}") for i, entry in enumerate(solids)])
+    names = [
+        as_path(entry).stem if isinstance(entry, (str, os.PathLike)) else f"{i:0{width}d}"
+        for i, entry in enumerate(solids)
+    ]
+    return _checked([_shape(entry, name) for entry, name in zip(solids, names, strict=True)])
 
 
 def _surfaces(folder: Path, known: Sequence[str]) -> str:
@@ -158,13 +162,14 @@ def gather_landmarks(shapes: list[Shape], landmarks: Any) -> list[Shape]:
         marks = [as_reals(landmarks[s.name], f"landmarks[{s.name!r}]", (None, 3)) for s in shapes]
     else:
         marks = list(as_reals(landmarks, "landmarks", (len(shapes), None, 3)))
+    if all(not isinstance(mark, Path) and not len(mark) for mark in marks):
+        return shapes
     return [Shape(s.name, s.source, mark) for s, mark in zip(shapes, marks, strict=True)]
 
 
 def _shape(entry: Any, name: str) -> Shape:
     if isinstance(entry, (str, os.PathLike)):
-        path = as_path(entry)
-        return Shape(path.stem if name.isdigit() else name, path)
+        return Shape(name, as_path(entry))
     return Shape(name, as_solid(entry, f"solids[{name}]"))
 
 

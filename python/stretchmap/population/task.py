@@ -31,7 +31,7 @@ from .fitting import Anchors, Template
 from .pose import looks_mirrored
 from .shapes import Shape
 
-__all__ = ["Job", "Record", "failed", "run_job"]
+__all__ = ["Job", "Record", "failed", "map_file", "run_job"]
 
 Record = dict[str, Any]
 
@@ -67,8 +67,8 @@ class Job:
 
     @property
     def map_file(self) -> Path:
-        """Of the latest round."""
-        return self.folder / "maps" / f"{self.shape.name}.npz"
+        """From the template of this round to the shape."""
+        return map_file(self.folder, self.shape.name, self.round)
 
     @property
     def image_file(self) -> Path:
@@ -92,6 +92,11 @@ class Job:
         text = (self.shape.digest(), self.template, hashlib.sha256(start).hexdigest(), __version__)
         options = (self.round, self.along, self.volume_weight)
         return hashlib.sha256(repr((text, options)).encode()).hexdigest()
+
+
+def map_file(folder: Path, name: str, number: int) -> Path:
+    """Where a run keeps the map of a round's template to a shape."""
+    return folder / "maps" / f"{name}-{number}.npz"
 
 
 def run_job(job: Job) -> Record:
@@ -188,7 +193,8 @@ def _done(job: Job, key: str) -> Record | None:
         return None
     if not isinstance(record, dict) or record.get("key") != key or record.get("once_more"):
         return None
-    return record if not record.get("ok") or job.image_file.exists() else None
+    there = job.image_file.exists() and job.map_file.exists()
+    return record if there or not record.get("ok") else None
 
 
 def _write(job: Job, record: Record) -> None:

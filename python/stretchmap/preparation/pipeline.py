@@ -16,6 +16,7 @@ from ..base.arrays import as_reals
 from ..base.progress import Progress, report
 from ..errors import (
     ConnectivityError,
+    DegenerateError,
     GenusError,
     OptionError,
     SelfIntersectionError,
@@ -134,6 +135,8 @@ def prepare(
             raise OptionError("spacing is that of the voxels of a mask, a surface has none")
         V, F = raw.V, raw.F
     V, F = run.arrays("weld", weld, V, F, _WELD * float(np.ptp(V, axis=0).max()))
+    if not len(F):
+        raise DegenerateError("the surface has no face of any size: all its points lie together")
     V, F = run.arrays("orient", part_sheets, V, F)
     V, F = run.arrays("debris", keep_largest, V, F)
     V, F = run.arrays("holes", close_holes, V, F)

@@ -67,6 +67,8 @@ def mask_surface(
     body = labels == sizes.argmax() + 1
     filled = ndimage.binary_fill_holes(body)
     field = ndimage.gaussian_filter(filled.astype(np.float32), _BLUR)
+    if not field.max() > 0.5:
+        raise ArrayError("the mask is nowhere thicker than a voxel; resample it finer")
     V, F, _, _ = marching_cubes(field, 0.5)
     counts = {
         "island_voxels_dropped": int(sizes.sum() - sizes.max()),

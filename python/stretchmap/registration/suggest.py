@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..errors import LandmarkError, OptionError
+from ..base.options import instance, whole
+from ..errors import LandmarkError
 from ..mesh.normals import vertex_normals
-
-if TYPE_CHECKING:
-    from .result import Registration
 from .landmarks import Landmarks, similarity
+from .result import Registration
 
 __all__ = ["landmarks_between"]
 
@@ -53,8 +50,8 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     >>> len(landmarks_between(sm.register(one, other), n=4))
     4
     """
-    if n < 1:
-        raise OptionError(f"n must be positive, got {n}")
+    registration = instance("registration", registration, Registration, "register(source, target)")
+    n = whole("n", n, 1)
     solid, target = registration.mesh, registration.target
     first, second = solid.surface, target.surface
     image = registration.image[solid.boundary_vertices]
@@ -67,6 +64,9 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     _, home = back.query(second.V[partner])
     edge = np.linalg.norm(np.diff(moved[first.edges], axis=1), axis=2).mean()
     usable = (agree > _SAME_WAY) & (np.linalg.norm(moved[home] - moved, axis=1) < 2.0 * edge)
+    refinement = registration.refinement
+    given = solid.n_vertices - (0 if refinement is None else refinement.n_split)
+    usable &= solid.boundary_vertices < given  # what was put in is no vertex of the source
     chosen: list[int] = []
     nearest = np.where(usable, np.linalg.norm(moved - moved.mean(axis=0), axis=1), -1.0)
     while len(chosen) < n and nearest.max() > 0.0:

@@ -82,6 +82,17 @@ def test_solid_comes_back_with_its_data(suffix, solid, tmp_path, capfd):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.parametrize("name", ["x", "z", "höhe"])
+def test_ply_refuses_names_it_has_for_the_mesh(surface, tmp_path, name):
+    with pytest.raises(ArrayError, match="rename it"):
+        write(tmp_path / "t.ply", surface, point_data={name: surface.V[:, 0]})
+    with pytest.raises(ArrayError, match="rename it"):
+        write(tmp_path / "t.ply", surface, cell_data={"vertex_indices": surface.face_areas})
+    assert not list(tmp_path.iterdir())
+    write(tmp_path / "t.ply", surface, point_data={"xy": surface.V[:, 0]})
+    assert set(read_arrays(tmp_path / "t.ply").point_data) == {"xy"}
+
+
 def test_ply_keeps_scalars_and_splits_vectors(surface, tmp_path):
     path = tmp_path / "t.ply"
     ratios = np.linspace(0, 1, surface.n_faces)

@@ -90,6 +90,10 @@ def test_a_field_that_does_not_vary_has_no_t(bones, found):
 
 
 def test_what_does_not_fit_is_refused(bones, found):
+    name, solid = found.names[0], bones.solids[int(found.names[0])]
+    for width in (1, 3):
+        with pytest.raises(ArrayError, match="values must have shape"):
+            sm.population.carry_field(found, name, np.ones((solid.n_vertices, width)))
     good = fields(bones, found)
     with pytest.raises(OptionError, match="name must be '0', '1'"):
         sm.population.carry_field(found, "x", good["0"])

@@ -101,6 +101,34 @@ def test_maps_are_kept(serial):
         serial.map("bone9")
 
 
+def test_a_map_is_that_of_the_round_it_is_asked_of(bones, tmp_path):
+    solids = dict(zip("123", bones.solids, strict=False))  # names that are numbers stay
+    last = sm.population.fit(solids, folder=tmp_path, max_rounds=2, tol=0.0)
+    first = sm.population.fit(solids, folder=tmp_path, max_rounds=1, tol=0.0)
+    n = first.mean.n_vertices
+    assert first.names == ("1", "2", "3")
+    for found in (first, last):
+        assert np.array_equal(found.map("2").image[:n], found.correspondences[1])
+    assert not np.array_equal(first.map("2").image[:n], last.map("2").image[:n])
+    (tmp_path / "maps" / "2-0.npz").unlink()
+    again = sm.population.fit(solids, folder=tmp_path, max_rounds=1, tol=0.0)
+    assert np.array_equal(again.map("2").image, first.map("2").image)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes of POSIX systems")
+def test_a_pipe_among_the_files_is_named_and_skipped(folder, tmp_path):
+    os.mkfifo(tmp_path / "pipe.npz")
+    paths = [folder / "bone0.npz", folder / "bone1.npz", tmp_path / "pipe.npz"]
+    found = sm.population.fit(paths, max_rounds=1, tol=0.0)
+    assert found.names == ("bone0", "bone1") and "pipe" in found.skipped["pipe"]
+
+
+def test_no_landmarks_at_all_are_none(bones):
+    plain = sm.population.fit(bones.solids[:3], max_rounds=1, tol=0.0)
+    none = sm.population.fit(bones.solids[:3], landmarks=np.zeros((3, 0, 3)), max_rounds=1, tol=0.0)
+    same(plain, none)
+
+
 def test_a_finished_run_is_taken_up_as_it_is(serial, folder):
     times = {p: p.stat().st_mtime_ns for p in (serial.folder / "images").iterdir()}
     again = sm.population.fit(folder, folder=serial.folder, **ROUNDS)

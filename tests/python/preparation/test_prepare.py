@@ -19,6 +19,7 @@ from stretchmap.cli import main
 from stretchmap.errors import (
     ArrayError,
     ConnectivityError,
+    DegenerateError,
     FileFormatError,
     GenusError,
     KindError,
@@ -394,3 +395,14 @@ def test_damaged_masks(tmp_path):
     for name in ("a.npy", "b.npz"):
         with pytest.raises(FileFormatError, match=name):
             read_mask(tmp_path / name)
+
+
+def test_what_has_no_size_is_refused():
+    pytest.importorskip("skimage")
+    thin = np.zeros((9, 9, 3), bool)
+    thin[1:8, 1:8, 1] = True
+    thin[2:7, 2:7, 1] = False
+    with pytest.raises(ArrayError, match="thicker than a voxel"):
+        sm.prepare(thin)
+    with pytest.raises(DegenerateError, match="no face of any size"):
+        sm.prepare(sm.TriMesh(np.zeros((3, 3)), [[0, 1, 2]]))

@@ -280,6 +280,18 @@ def test_landmarks_by_rule(pair):
     assert len(marks) == 32 and len(set(marks.source)) == len(set(marks.target)) == 32
     with pytest.raises(LandmarkError):
         landmarks_between(free, 10**5)
+    with pytest.raises(OptionError, match="n must be"):
+        landmarks_between(free, "3")
+    with pytest.raises(OptionError, match="registration must be"):
+        landmarks_between(sm.fill(pair.source, pair.source.surface.V))
+
+
+def test_suggested_landmarks_are_vertices_of_the_source(pair):
+    rough = sm.samples.tetrahedralize(pair.source.surface, quality=1e6)
+    found = register(rough, pair.target, keep_best=True)
+    assert found.refinement is not None and found.refinement.n_split > 0
+    marks = landmarks_between(found, 30)
+    assert max(marks.source) < rough.n_vertices
 
 
 def test_saving(registered, tmp_path):
