@@ -140,6 +140,9 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std
     }
   } catch (const Error&) {  // singular: nothing to be had
     now.ring_std = std::numeric_limits<double>::infinity();
+  } catch (...) {  // interrupted
+    angles_ = start;
+    throw;
   }
   if (now.ring_std <= kRingGoal && good(now)) {
     rings_.reset();

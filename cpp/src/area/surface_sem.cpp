@@ -1,5 +1,6 @@
 #include "stretchmap/area/surface_sem.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -45,7 +46,7 @@ SemStep SurfaceSem::step() {
   SparseMatrix matrix = chart_stretch_laplacian(pattern_, chart_, areas_, periods_, turns_);
   pin(matrix);
   if (solver_) {
-    solver_->matrix().swap(matrix);
+    std::copy_n(matrix.valuePtr(), matrix.nonZeros(), solver_->matrix().valuePtr());
     solver_->refactor();
   } else {
     solver_.emplace(std::move(matrix));

@@ -254,13 +254,15 @@ Edges crossing_faces(const PointsRef& points, const FacesRef& faces, Index limit
     std::vector<std::vector<std::array<Index, 2>>> found(chunk_count(count, kCostlyChunk));
     for_chunks(count, kCostlyChunk, [&](Index begin, Index end) {
       std::vector<Index> near;
-      for (Index f = first + begin; f < first + end; ++f) {
+      auto& pairs_here = found[begin / kCostlyChunk];
+      // No chunk needs more than are wanted in all: a heap of faces in one place has their square.
+      const auto open = [&] { return static_cast<Index>(pairs_here.size()) < limit; };
+      for (Index f = first + begin; f < first + end && open(); ++f) {
         near.clear();
         tree.overlaps(f, near);
         std::sort(near.begin(), near.end());
-        for (const Index g : near)
-          if (triangles_meet(points, faces.row(f), faces.row(g)))
-            found[begin / kCostlyChunk].push_back({f, g});
+        for (auto g = near.begin(); g != near.end() && open(); ++g)
+          if (triangles_meet(points, faces.row(f), faces.row(*g))) pairs_here.push_back({f, *g});
       }
     });
     for (const auto& part : found) pairs.insert(pairs.end(), part.begin(), part.end());

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
@@ -37,13 +38,13 @@ class Flipper {
     std::vector<Index> stack(n);
     for (Index e = 0; e < n; ++e) stack[e] = n - 1 - e;
     std::vector<char> waiting(n, 1);
-    Index flips = 0;
+    std::int64_t flips = 0;
     while (!stack.empty()) {
       const Index e = stack.back();
       stack.pop_back();
       waiting[e] = 0;
       if (weight(e) >= -1e-12) continue;
-      if (++flips > 100 * n) {
+      if (++flips > std::int64_t{100} * n) {
         throw Error("SolverError",
                     "the intrinsic Delaunay triangulation does not settle: the surface has needle "
                     "triangles; remesh it");
@@ -54,7 +55,7 @@ class Flipper {
         waiting[side] = 1;
       }
     }
-    return flips;
+    return static_cast<Index>(flips);
   }
 
   IntrinsicDelaunay result() const {

@@ -33,7 +33,7 @@ Vector3d closest_weights(const Vector3d& p, const Vector3d& a, const Vector3d& b
   const double d5 = ab.dot(cp), d6 = ac.dot(cp);
   if (neither_positive(-d6, d5 - d6)) return {0.0, 0.0, 1.0};
   const double at_c = d1 * d4 - d3 * d2, at_b = d5 * d2 - d1 * d6, at_a = d3 * d6 - d5 * d4;
-  if (at_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
+  if (at_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0 && d1 > d3) {
     const double t = d1 / (d1 - d3);
     return {1.0 - t, t, 0.0};
   }
@@ -108,6 +108,9 @@ Foot SurfaceTree::on_face(const Vector3d& query, Index face) const {
 
 Foot SurfaceTree::closest(const Vector3d& query, Index hint) const {
   Foot best = on_face(query, hint);
+  // A face without area may have no answer.
+  if (!(best.squared_distance >= 0.0))
+    best.squared_distance = std::numeric_limits<double>::infinity();
   struct Open {
     Index node;
     double distance;

@@ -40,11 +40,12 @@ ChartLocator::ChartLocator(area::SurfaceChart chart, const Points2Ref& turns)
         }
     }
   };
-  faces_ = Incidence<>(size_ * size_, for_cells);
+  faces_ = Incidence<Index, std::int64_t>(size_ * size_, for_cells);
 }
 
 Index ChartLocator::wrap(double coordinate) const {
   const double fraction = coordinate - std::floor(coordinate);
+  if (!(fraction >= 0.0)) return 0;  // of no number: found nowhere
   return std::min(static_cast<Index>(fraction * size_), size_ - 1);
 }
 

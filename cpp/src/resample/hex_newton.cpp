@@ -36,6 +36,7 @@ bool HexNewton::step(Points& x, const HexWeights& w, const HexNewtonOptions& opt
   Points trial;
   HexReport there;
   const auto energy = [&](double alpha) {
+    if (poll) poll();
     trial = x + alpha * direction;
     there = energy_.value(trial, w);
     return there.energy;

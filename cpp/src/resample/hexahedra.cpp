@@ -15,6 +15,9 @@ using Corners = std::array<Vector3d, 8>;
 using Coefficients = std::array<double, 27>;
 
 constexpr int kMostHalvings = 60;  // twenty of each direction
+// Parts of one hexahedron that are looked at: one whose determinant comes near zero along a surface
+// has their number grow with every halving, and counts as not proven positive.
+constexpr int kMostParts = 100'000;
 constexpr int kStride[3] = {9, 3, 1};
 
 // Corner at the ends (i, j, k) of the three directions.
@@ -107,7 +110,8 @@ bool positive(const Coefficients& whole, double bound) {
   if (corner_at_most(whole, bound)) return false;
   if (all_above(whole, bound)) return true;
   std::vector<Part> open = {{whole, 0}};
-  while (!open.empty()) {
+  for (int parts = 0; !open.empty(); ++parts) {
+    if (parts == kMostParts) return false;
     const Part part = open.back();
     open.pop_back();
     if (part.halvings == kMostHalvings) return false;

@@ -33,6 +33,7 @@ class Bins {
     for (int a = 0; a < 4; ++a) {
       double point = (common + (near - far) * value[a]) / period_;
       if (periodic_) point -= std::floor(point);
+      if (!(point >= 0.0)) point = 0.0;
       bin[a] = static_cast<Index>(std::clamp(point * bins_, 0.0, bins_ - 1.0));
     }
     return bin;

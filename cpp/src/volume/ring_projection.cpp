@@ -72,8 +72,10 @@ Vec RingProjection::forward(const std::vector<Points>& slopes, const Points& d) 
 double RingProjection::error(const PointsRef& x, const VecRef& target) const {
   const Vec current = rings(mesh::tet_volumes(x, tets_));
   double worst = 0.0;
-  for (Index i = 0; i < fixed_.size(); ++i)
-    if (!fixed_[i]) worst = std::max(worst, std::abs(current[i] / target[i] - 1.0));
+  for (Index i = 0; i < fixed_.size(); ++i) {
+    const double off = std::abs(current[i] / target[i] - 1.0);
+    if (!fixed_[i] && !(off <= worst)) worst = off;  // one that is no number is the worst
+  }
   return worst;
 }
 
@@ -89,7 +91,7 @@ RingStep RingProjection::step(const PointsRef& x, const VecRef& target, double t
   const double goal = tol * residual.norm();
   Vec z = Vec::Zero(residual.size()), p = residual;
   double square = residual.squaredNorm();
-  while (std::sqrt(square) > goal) {
+  while (!(std::sqrt(square) <= goal)) {
     if (result.cg_iterations++ == max_cg)
       throw Error("SolverError", "the ring volumes could not be made exact: residual " +
                                      std::to_string(std::sqrt(square) / goal) +
@@ -97,7 +99,12 @@ RingStep RingProjection::step(const PointsRef& x, const VecRef& target, double t
                                      " iterations");
     if (poll && result.cg_iterations % 16 == 0) poll();
     const Vec Ap = forward(slopes, transposed(slopes, p));
-    const double alpha = square / p.dot(Ap);
+    const double curvature = p.dot(Ap);
+    if (!(curvature > 0.0))
+      throw Error(
+          "SolverError",
+          "the ring volumes could not be made exact: some do not depend on any free vertex");
+    const double alpha = square / curvature;
     z += alpha * p;
     residual -= alpha * Ap;
     const double next = residual.squaredNorm();

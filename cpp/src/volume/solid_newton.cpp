@@ -167,7 +167,7 @@ void SolidNewton::try_eased(Points& x, const Points& start, Points& direction,
   report.alpha = 1.0;
 }
 
-bool SolidNewton::search(Points& x, Points& direction, const EnergyWeights& w,
+bool SolidNewton::search(Points& x, Points& direction, const EnergyWeights& w, const Poll& poll,
                          NewtonReport& report) {
   const Points start = x;
   const double longest = w.epsilon > 0.0 ? 1.0 : energy_.longest_step(x, direction);
@@ -175,10 +175,12 @@ bool SolidNewton::search(Points& x, Points& direction, const EnergyWeights& w,
   EnergyReport there;
   const double alpha =
       linalg::backtrack(report.before.energy, -report.decrement, longest, kTries, [&](double t) {
+        if (poll) poll();
         trial = energy_.move(start, direction, t);
         there = energy_.value(trial, w);
         return there.energy;
       });
+  if (poll) poll();
   if (alpha > 0.0) {
     x = std::move(trial);
     report.after = there;
@@ -243,7 +245,7 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
     if (report.negative_curvature && k == first)
       down = solve_projected(x, w, options, poll, direction, report);
     if (!down) continue;
-    if (search(x, direction, w, report)) break;
+    if (search(x, direction, w, poll, report)) break;
     if (report.decrement <= kRounding * std::abs(report.before.energy)) break;
   }
   cut_short_ = report.alpha < kCutShort || (cut_short_ && report.alpha < kHeldUp);

@@ -1,5 +1,7 @@
 """The certificate: predicates against rational arithmetic, good maps accepted, bad ones refused."""
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -353,3 +355,18 @@ def test_wide_faces_of_a_fat_torus_are_judged_as_their_points_say():
         assert strictly == (proven and narrow)
         seen.add((proven, narrow))
     assert seen == {(True, True), (True, False), (False, True), (False, False)}
+
+
+def test_a_heap_of_faces_is_no_square_of_them():
+    surface = samples.torus_surface(200, 100)
+    heap = surface.V.copy()
+    heap[:9000] = heap[0]
+    start = time.process_time()
+    assert len(_core.certificate.crossing_faces(heap, surface.F, 1000)) == 1000
+    assert time.process_time() - start < 5.0
+    small = samples.torus_surface(30, 12)
+    turned = small.V.copy()
+    turned[[0, 5]] *= -1.0
+    pairs = _core.certificate.crossing_faces(turned, small.F, 10**6)
+    assert len(pairs) > 7
+    np.testing.assert_array_equal(_core.certificate.crossing_faces(turned, small.F, 7), pairs[:7])

@@ -45,7 +45,7 @@ def test_solutions_are_as_exact_as_lapack(n, least):
     assert left < 4.0 * usual + 1e-14 * n
 
 
-@pytest.mark.parametrize("values", [[1.0, -1.0], [1.0, 0.0], [1.0, np.nan]])
+@pytest.mark.parametrize("values", [[1.0, -1.0], [1.0, 0.0], [1.0, np.nan], [1.0, np.inf]])
 def test_what_is_not_positive_definite_is_refused(values):
     with pytest.raises(errors.SolverError, match="positive definite"):
         _core.linalg.solve_dense(np.diag(values), np.ones(2))

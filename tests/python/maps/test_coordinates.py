@@ -10,7 +10,7 @@ import pytest
 
 import stretchmap as sm
 from shapes import a_map
-from stretchmap import samples
+from stretchmap import _core, samples
 from stretchmap.errors import ArrayError, NonFiniteError, OptionError
 from stretchmap.maps.points import PointMap
 
@@ -155,3 +155,11 @@ def test_bad_input_is_named(bumpy_map):
         PointMap(bumpy_map, tolerance=-1.0)
     with pytest.raises(OptionError):
         a_map(bumpy_map.mesh, bumpy_map.image).coordinates()
+
+
+def test_a_face_without_area_hides_no_closest_point():
+    V = np.array([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    F = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4]], np.int32)  # the search begins at the first
+    queries = np.array([[0.5, -0.3, 0.0], [0.2, 0.2, 0.1]])
+    points = _core.maps.SurfaceTree(V, F).closest(queries)[0]
+    np.testing.assert_allclose(points, [[0.5, 0.0, 0.0], [0.2, 0.2, 0.0]], atol=1e-15)

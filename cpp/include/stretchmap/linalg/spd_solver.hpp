@@ -39,6 +39,7 @@ class SpdSolver {
   SpdSolver(SpdSolver&&) noexcept;
   SpdSolver& operator=(SpdSolver&&) noexcept;
 
+  // Its arrays stay where they are: solvers point into them, so values are written, never swapped.
   SparseMatrix& matrix();
   const SparseMatrix& matrix() const;
 

@@ -2,6 +2,7 @@
 // coordinates.
 #pragma once
 
+#include <cstdint>
 #include <limits>
 
 #include "stretchmap/area/chart.hpp"
@@ -37,8 +38,8 @@ class ChartLocator {
 
   area::SurfaceChart chart_;
   Points2 turns_;
-  Index size_;         // cells per turn
-  Incidence<> faces_;  // of each cell
+  Index size_;                            // cells per turn
+  Incidence<Index, std::int64_t> faces_;  // of each cell
 };
 
 }  // namespace stretchmap::registration

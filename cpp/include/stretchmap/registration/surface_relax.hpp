@@ -7,7 +7,6 @@
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/base/types.hpp"
 #include "stretchmap/registration/surface_walk.hpp"
-#include "stretchmap/volume/tet_laplacian.hpp"
 
 namespace stretchmap::registration {
 

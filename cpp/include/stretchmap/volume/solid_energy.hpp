@@ -19,7 +19,6 @@
 #include "stretchmap/linalg/block_solver.hpp"
 #include "stretchmap/volume/boundary_barrier.hpp"
 #include "stretchmap/volume/element_energy.hpp"
-#include "stretchmap/volume/tet_laplacian.hpp"
 
 namespace stretchmap::volume {
 

@@ -56,7 +56,8 @@ class SolidNewton {
                     const Poll& poll = {});
 
  private:
-  bool search(Points& x, Points& direction, const EnergyWeights& w, NewtonReport& report);
+  bool search(Points& x, Points& direction, const EnergyWeights& w, const Poll& poll,
+              NewtonReport& report);
   void try_double_step(Points& x, const Points& start, const Points& direction,
                        const EnergyWeights& w, NewtonReport& report) const;
   void try_held_back(Points& x, const Points& start, Points& direction, const EnergyWeights& w,

@@ -173,7 +173,7 @@ Index eliminate_front(double* panel, double* schur, Index rows, Index own) {
            begin, begin, begin, diagonal.data());
     for (Index c = begin; c < end; ++c) {
       diagonal[c] = panel[c * stride + c];
-      if (!std::isfinite(1.0 / diagonal[c])) return c;
+      if (!std::isfinite(diagonal[c]) || !std::isfinite(1.0 / diagonal[c])) return c;
       eliminate_column(panel, stride, c, end);
     }
     for_chunks(rows - end, kRows, [&](Index top, Index bottom) {

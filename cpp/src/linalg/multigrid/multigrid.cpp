@@ -123,23 +123,6 @@ void Multigrid<B, K>::unbalanced(const float* z, float* change) {
   finest_.A.unbalanced(step, change);
 }
 
-template <int B, int K>
-std::vector<Index> Multigrid<B, K>::level_sizes() const {
-  std::vector<Index> sizes{finest_.A.n};
-  for (const Level<K, K>& level : coarse_) sizes.push_back(level.A.n);
-  sizes.push_back(last_pattern_.rows());
-  return sizes;
-}
-
-template <int B, int K>
-double Multigrid<B, K>::operator_complexity() const {
-  const double finest = static_cast<double>(B * B) * (finest_.A.col.size() + finest_.A.n);
-  double all = finest + static_cast<double>(K * K) * last_pattern_.col.size();
-  for (const Level<K, K>& level : coarse_)
-    all += static_cast<double>(K * K) * (level.A.col.size() + level.A.n);
-  return all / finest;
-}
-
 template class Multigrid<1, 1>;
 template void Multigrid<1, 1>::precondition<1>(const float*, float*);
 template void Multigrid<1, 1>::precondition<2>(const float*, float*);

@@ -44,9 +44,6 @@ class Multigrid {
   // change = A z - r after that, of one column.
   void unbalanced(const float* z, float* change);
 
-  std::vector<Index> level_sizes() const;  // block rows, finest first, coarsest last
-  double operator_complexity() const;      // numbers stored on all levels over the finest's
-
  private:
   Level<B, K> finest_;
   std::vector<Level<K, K>> coarse_;
