@@ -445,6 +445,13 @@ def test_the_package_run_as_a_module_is_the_command(folder):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def as_in_a_terminal():
+    """However the tests were started: in the background, or by nohup, signals are ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_interrupting_exits_130_at_once_without_traceback(tmp_path, how):
     sm.write(tmp_path / "big.npz", samples.vertebra_like(120_000))
@@ -455,7 +462,7 @@ def test_interrupting_exits_130_at_once_without_traceback(tmp_path, how):
         stderr=subprocess.PIPE,
         text=True,
         env=ENV,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=as_in_a_terminal,
     )
     time.sleep(2.0)
     run.send_signal(getattr(signal, how))
