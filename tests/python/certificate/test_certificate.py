@@ -11,7 +11,14 @@ from scipy.optimize import linprog
 import reference as ref
 from stretchmap import TetMesh, Torus, TriMesh, _core, certify, samples
 from stretchmap.certificate.checks import certify_file
-from stretchmap.errors import ArrayError, FileFormatError, NonFiniteError, OptionError
+from stretchmap.certificate.findings import require_certified
+from stretchmap.errors import (
+    ArrayError,
+    CertificationError,
+    FileFormatError,
+    NonFiniteError,
+    OptionError,
+)
 
 TORUS = Torus(3.0, 1.0)
 
@@ -165,6 +172,12 @@ def test_fallback_where_the_boundary_is_no_graph():
     certificate = certify(bumpy, bumpy.V, Torus(3.6, 0.5), tolerance=10.0)
     assert not certificate.checks["boundary_graph"]
     assert certificate.checks["boundary_embedded"]
+    # Of its surface, the ids of a refusal are those of the reason, not of what failed first.
+    refused = certify(bumpy.surface, bumpy.surface.V, Torus(3.6, 0.5))
+    assert "folded" in refused.reason and refused.ids["boundary_graph"]
+    with pytest.raises(CertificationError) as caught:
+        require_certified(refused, "it")
+    assert caught.value.ids == refused.ids["boundary_oriented"] != refused.ids["boundary_graph"]
 
 
 def test_surface_maps(solid):

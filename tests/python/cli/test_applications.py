@@ -219,6 +219,14 @@ def test_frames_appear_together_or_not_at_all(bumpy_map, tmp_path, monkeypatch):
     assert len(written) == 2 and not list(tmp_path.iterdir())
 
 
+def test_frames_of_a_morph_are_not_taken_for_leftovers(bumpy_map, tmp_path, monkeypatch):
+    """However long they take: what another writer may delete has to be older than a minute."""
+    pytest.importorskip("meshio")
+    monkeypatch.setattr("stretchmap.base.files._LEFT_OVER", -1.0)
+    written = morph(bumpy_map, 4).save(tmp_path / "m.pvd")
+    assert sorted(tmp_path.iterdir()) == sorted(written) and len(written) == 5
+
+
 def test_register_command_names_the_mesh_at_fault(folder, capsys):
     sm.write(folder / "ball.npz", samples.ball(3))
     assert run("register", folder / "a.npz", folder / "ball.npz", "-o", folder / "x.npz") == 2

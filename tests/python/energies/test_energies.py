@@ -164,3 +164,11 @@ def test_errors_name_what_is_wrong():
         barrier.elements(SOLID.V, 3)
     with pytest.raises(OptionError, match="positive"):
         energies.DistortionEnergy(SOLID, weights=np.zeros(SOLID.n_tets))
+
+
+def test_weights_are_those_given_at_the_beginning():
+    weights = np.full(SOLID.n_tets, 1.0 / SOLID.n_tets)
+    energy = energies.DistortionEnergy(SOLID, weights=weights)
+    before = energy.value(SOLID.V * [1.0, 1.0, 2.0])
+    weights *= 3.0
+    assert energy.value(SOLID.V * [1.0, 1.0, 2.0]) == before
