@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from .. import _core
 from ..errors import GenusError, SelfIntersectionError
 from ..mesh.given import require_same_mesh
-from ..mesh.meshes import TriMesh
 from .generators import generators_of
 from .integer import complement, integer_inverse, integer_kernel
 
 if TYPE_CHECKING:
-    from ..mesh.meshes import TetMesh
+    from ..mesh.meshes import TetMesh, TriMesh
 
 __all__ = [
     "bounding_by_linking",
@@ -76,14 +75,14 @@ def same_lattice(first: NDArray[np.int64], second: NDArray[np.int64]) -> bool:
     return rank == len(first) == len(second)
 
 
-def require_bounding_alike(solid: TetMesh, image: NDArray[np.float64]) -> None:
+def require_bounding_alike(solid: TetMesh, image: TriMesh) -> None:
     """Raise where what bounds in a solid does not bound behind an image of its boundary.
 
     Parameters
     ----------
     solid : TetMesh
-    image : ndarray, shape (nb, 3)
-        Of its boundary vertices, embedded.
+    image : TriMesh
+        Of its boundary, with the same faces; embedded.
 
     Raises
     ------
@@ -95,7 +94,7 @@ def require_bounding_alike(solid: TetMesh, image: NDArray[np.float64]) -> None:
         return
     loops, _, intersection = generators_of(surface)
     within = bounding_in(solid, surface, loops)
-    behind = bounding_by_linking(TriMesh(image, surface.F), loops, intersection)[1]
+    behind = bounding_by_linking(image, loops, intersection)[1]
     if not same_lattice(within, behind):
         raise GenusError(
             "the boundary image turns the solid inside out: loops that bound inside of the solid, "

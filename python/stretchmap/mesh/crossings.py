@@ -27,13 +27,12 @@ def require_no_crossing(surface: TriMesh, what: str, remedy: str) -> None:
     Raises
     ------
     SelfIntersectionError
-        ``ids`` are the faces, of the first thousand pairs.
+        ``ids`` are pairs of faces one after the other, a thousand at most.
     """
     pairs = surface.crossing_faces
     if len(pairs):
-        ids = np.unique(pairs)
         more = "at least " if len(pairs) == MOST_PAIRS else ""
+        faces = describe("face", np.unique(pairs))
         raise SelfIntersectionError(
-            f"{what} touches or crosses itself at {more}{describe('face', ids)}; {remedy}",
-            ids.tolist(),
+            f"{what} touches or crosses itself at {more}{faces}; {remedy}", pairs.ravel().tolist()
         )

@@ -62,7 +62,7 @@ def tetrahedralize(
         If the surface has a border, is not manifold or not orientable, or has a face without area
         or twice, see `TriMesh.diagnose`.
     SelfIntersectionError
-        If the surface crosses itself; ``ids`` are the faces.
+        If the surface crosses itself; ``ids`` are pairs of faces.
     SolverError
         If the surface cannot be filled otherwise, or was changed.
 

@@ -30,6 +30,7 @@ from .. import _core
 from ..base.arrays import read_only
 from ..base.options import flag, real, whole
 from ..base.tables import HasSummary, plain_dict, table
+from ..base.torus import MOST_RADIANS
 from ..errors import OptionError, SolverError
 from ..maps.given import as_map_of_solid, torus_of
 from ..maps.result import MapResult
@@ -41,7 +42,6 @@ from .levels import Coordinate, asked_shares, cut_nested, levels_of
 __all__ = ["Coordinate", "Partition", "partition"]
 
 _TOLERANCE = 1e-12  # relative error of a part's volume
-_MOST_TURNS = 1e3  # radians a start may be away from zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +245,7 @@ def partition(
     """
     mapped, source = as_map_of_solid(result, "a partition")
     axes, shares = asked_shares(fractions, by, source.n_tets)
-    start, correct = real("start", start, -_MOST_TURNS, _MOST_TURNS), flag("correct", correct)
+    start, correct = real("start", start, -MOST_RADIANS, MOST_RADIANS), flag("correct", correct)
     pieces = Pieces.of(source, mapped.image, torus_of(mapped))
     uncorrected = [
         levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)

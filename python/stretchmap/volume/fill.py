@@ -10,19 +10,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import _core
 from ..base.arrays import as_points, describe, read_only
 from ..base.options import callback, flag, instance
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate, require_certified
-from ..errors import ArrayError, GenusError, SelfIntersectionError
+from ..errors import ArrayError, GenusError
 from ..homology.bounding import require_bounding_alike
 from ..maps.result import MapResult
 from ..mesh.crossings import UNLESS_KEPT, require_no_crossing
 from ..mesh.given import as_solid
-from ..mesh.meshes import TetMesh
+from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.refinement import Refinement
 from .engine import solve
 from .options import FillOptions
@@ -31,8 +30,6 @@ from .problem import Outcome, VolumeProblem
 __all__ = ["FillMap", "fill", "filled"]
 
 _log = logging.getLogger("stretchmap")
-
-_MOST_PAIRS = 1000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -197,17 +194,10 @@ def filled(
     """`fill` of checked arguments, even ``anyway`` where no map can be one to one."""
     clock = time.perf_counter()
     problem = VolumeProblem.of(solid, points, refine=options.refine)
-    crossing = _core.certificate.crossing_faces(points, solid.surface.F, _MOST_PAIRS)
-    if len(crossing):
-        more = "at least " if len(crossing) == _MOST_PAIRS else ""
-        raise SelfIntersectionError(
-            f"the boundary image touches or crosses itself: {more}"
-            f"{describe('face pair', crossing)}; no "
-            "map of the inside can be one to one",
-            crossing.ravel(),
-        )
+    image = TriMesh(points, solid.surface.F)
+    require_no_crossing(image, "the boundary image", "no map of the inside can be one to one")
     if not anyway:
-        require_bounding_alike(solid, points)
+        require_bounding_alike(solid, image)
     seconds = {"check": time.perf_counter() - clock}
     outcome = solve(problem, options, progress=progress)
     return _result(outcome, solid, points, seconds)

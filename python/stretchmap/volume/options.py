@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from ..area.search import Ratio
 from ..base.options import SOLVERS, flag, instance, one_of, real, shown, whole
+from ..base.torus import MOST_RADIANS
 from ..errors import OptionError
 
 __all__ = ["FillOptions", "VolumeOptions", "balanced", "check_call", "free_at", "weight_at"]
 
 
-_MOST_TURNS = 1e3  # a phase may have, as for `area_map`
 _MOST_WEIGHT = 1e4  # of the volume term; beyond it nothing changes
 _EVEN_WEIGHT = 10.0  # half-way to shape
 # At the end of shape: ratios between these are free, and others cost more than half-way.
@@ -190,7 +190,7 @@ class VolumeOptions(FillOptions):
         elif self.ratio is not None:
             real("ratio", self.ratio, above=1.0)
         if self.phase is not None:
-            real("phase", self.phase, -_MOST_TURNS, _MOST_TURNS)
+            real("phase", self.phase, -MOST_RADIANS, MOST_RADIANS)
         if self.tol is not None:
             real("tol", self.tol, 0.0, below=1.0)
         for name in ("target_iter", "shift_iter"):

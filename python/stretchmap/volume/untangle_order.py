@@ -118,10 +118,10 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
     history = run.history
+    begin = run.x
     if not run.resumed:  # else it has been at its end
         _bring_near(run)
-    begin = run.x
-    if not run.resumed:
+        begin = run.x
         run.x = untangle_whole(history.model, begin, history, glide=False, hasty=run.hasty).x
     if run.hasty and run.afar and _hopeless(run):
         near, inverted = run.x, _inverted(run)
