@@ -204,9 +204,10 @@ def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:
         The name of an array is one that PLY has for the mesh, or not of ASCII characters.
     """
     columns, cells = _columns(mesh.point_data), _columns(mesh.cell_data)
+    of_points, of_faces = set(_AXES), {"#", *_CORNERS}
     for name in (*columns, *cells):
-        taken = _AXES if name in columns else ("#", *_CORNERS)
-        if name in taken or not name.isascii():
+        taken = (name in columns and name in of_points) or (name in cells and name in of_faces)
+        if taken or not name.isascii():
             raise ArrayError(
                 f"an array named {shown(name)} cannot be written to .ply, whose names are of ASCII "
                 f"characters and other than {', '.join((*_AXES, *_CORNERS))}; rename it"

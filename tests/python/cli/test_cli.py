@@ -137,6 +137,14 @@ def test_a_run_goes_on_from_a_saved_map(folder):
     assert np.array_equal(first.mesh.T, second.mesh.T)
 
 
+def test_fields_of_a_saved_map_are_not_carried_along(folder, capsys):
+    pytest.importorskip("meshio")
+    assert main(["conformal", "surface.ply", "-o", "map.vtu", "-q"]) == 0
+    assert {"u", "v"} <= sm.io.read_arrays("map.vtu").point_data.keys()
+    assert main(["conformal", "map.vtu", "-o", "again.vtu", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
 def test_start_from_another_solids_map_is_refused(folder, capsys):
     sm.write("other.npz", samples.solid_torus(2500))
     assert main(["volume", "other.npz", "-o", "o.npz", "--c", "0", "--max-iter", "1", "-q"]) == 0

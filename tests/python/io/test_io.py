@@ -87,7 +87,8 @@ def test_ply_refuses_names_it_has_for_the_mesh(surface, tmp_path, name):
     with pytest.raises(ArrayError, match="rename it"):
         write(tmp_path / "t.ply", surface, point_data={name: surface.V[:, 0]})
     with pytest.raises(ArrayError, match="rename it"):
-        write(tmp_path / "t.ply", surface, cell_data={"vertex_indices": surface.face_areas})
+        both = {"vertex_indices": surface.V[:, 0]}, {"vertex_indices": surface.face_areas}
+        write(tmp_path / "t.ply", surface, *both)
     assert not list(tmp_path.iterdir())
     write(tmp_path / "t.ply", surface, point_data={"xy": surface.V[:, 0]})
     assert set(read_arrays(tmp_path / "t.ply").point_data) == {"xy"}
