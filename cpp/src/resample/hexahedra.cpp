@@ -17,7 +17,7 @@ using Coefficients = std::array<double, 27>;
 constexpr int kMostHalvings = 60;  // twenty of each direction
 // Parts of one hexahedron that are looked at: one whose determinant comes near zero along a surface
 // has their number grow with every halving, and counts as not proven positive.
-constexpr int kMostParts = 100'000;
+constexpr int kMostParts = 10'000'000;  // half a second
 constexpr int kStride[3] = {9, 3, 1};
 
 // Corner at the ends (i, j, k) of the three directions.

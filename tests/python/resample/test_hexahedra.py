@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import time
 
 import numpy as np
 import pytest
@@ -180,3 +181,15 @@ def test_nastran_files_hold_ten_digits_and_property_ids(grid, tmp_path):
 def test_other_suffixes_are_refused(grid, tmp_path):
     with pytest.raises(FileFormatError, match=r"\.bdf"):
         grid.save(tmp_path / "grid.stl")
+
+
+@pytest.mark.parametrize(("least", "proven"), [(1e-3, True), (1e-5, False)])
+def test_a_determinant_near_zero_along_a_plane_ends_in_time(least, proven):
+    """Its parts double with every halving; what is not proven in time does not count as valid."""
+    corners = []
+    for x, y, z in CUBE:
+        across = np.array([[x - 0.3, -least], [least, x - 0.3]]) @ [y - 0.5, z - 0.5]
+        corners.append([x, *across])  # its determinant is (x - 0.3)^2 + least^2
+    start = time.process_time()
+    assert valid(corners) == proven
+    assert time.process_time() - start < 20.0

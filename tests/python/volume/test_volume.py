@@ -15,7 +15,13 @@ from scipy.sparse.linalg import spsolve
 import stretchmap as sm
 from shapes import mug
 from stretchmap import _core, samples
-from stretchmap.errors import DegenerateError, KindError, OptionError, SelfIntersectionError
+from stretchmap.errors import (
+    DegenerateError,
+    KindError,
+    OptionError,
+    SelfIntersectionError,
+    SolverError,
+)
 from stretchmap.mesh.meshes import TetMesh
 from stretchmap.volume import vsem
 
@@ -321,6 +327,19 @@ def test_ring_volumes_can_be_made_exact(bumpy):
     assert np.abs(exact.distortion.ring_ratios[inner] - 1.0).max() < 1e-9
     assert exact.distortion.element_std <= 1.25 * plain.distortion.element_std
     assert np.abs(plain.distortion.ring_ratios[inner] - 1.0).max() > 1e-6
+
+
+def test_rings_that_no_free_vertex_changes_are_refused():
+    """All round one free vertex is what the fixed ones enclose, wherever it is."""
+    V = np.vstack([[[0.1, 0.0, 0.0]], np.eye(3), -np.eye(3)])
+    T = [[0, 1 + 3 * a, 2 + 3 * b, 3 + 3 * c] for a in range(2) for b in range(2) for c in range(2)]
+    star = TetMesh(V, T, orient=True)
+    fixed = np.ones(7, np.uint8)
+    fixed[0] = 0
+    projection = _core.volume.RingProjection(star.T, fixed)
+    with pytest.raises(SolverError, match="do not depend on any free vertex"):
+        projection.step(star.V, np.full(7, 2.0 * star.volume), 1e-4, 100)
+    assert not projection.error(star.V, np.full(7, np.nan)) < 1.0
 
 
 def test_refinement_is_reported_or_refused(load_solid):
