@@ -1,4 +1,4 @@
-"""Loops that generate the first homology of a closed surface, and the forms dual to them."""
+"""Loops that generate the first homology of a closed surface, and the forms dual to them (3.1)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def generators_of(
 ) -> tuple[list[NDArray[np.int32]], NDArray[np.int32], NDArray[np.int64]]:
     """2g loops, the (2g, e) closed forms with period ``i == j`` over them, and their intersection.
 
-    By a tree of short edges and one of the faces across the others.
+    By a tree of short edges and one of the faces across the others, paper section 3.1.
     """
     top = surface.topology
     lists, forms = _core.homology.tree_cotree(top, _core.mesh.edge_lengths(top, surface.V))
