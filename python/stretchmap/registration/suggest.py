@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.options import instance, whole
-from ..errors import LandmarkError
+from ..base.options import whole
+from ..errors import LandmarkError, OptionError
+from ..maps.files import LoadedMap
+from ..maps.given import as_map_of_solid
 from ..mesh.normals import vertex_normals
 from .landmarks import Landmarks, similarity
 from .result import Registration
@@ -16,7 +18,7 @@ __all__ = ["landmarks_between"]
 _SAME_WAY = 0.8  # least cosine between the normals of two points that are taken to correspond
 
 
-def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
+def landmarks_between(registration: Registration | LoadedMap, n: int = 36) -> Landmarks:
     """Landmarks by a geometric rule, where nobody has placed any.
 
     The source is laid on the target by the similarity that fits the registration best. Candidates
@@ -26,7 +28,7 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
 
     Parameters
     ----------
-    registration : Registration
+    registration : Registration, or LoadedMap of one
         Made without landmarks.
     n : int
         Number of landmarks.
@@ -38,7 +40,9 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     Raises
     ------
     OptionError
-        If ``n`` is not positive.
+        If ``n`` is not positive or the map no registration.
+    KindError
+        If it is no map of a solid.
     LandmarkError
         If the rule finds fewer.
 
@@ -50,11 +54,13 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     >>> len(landmarks_between(sm.register(one, other), n=4))
     4
     """
-    registration = instance("registration", registration, Registration, "register(source, target)")
+    mapped, solid = as_map_of_solid(registration, "finding landmarks")
+    target = mapped.target
+    if target is None:
+        raise OptionError("landmarks are found by a registration; this map has no target solid")
     n = whole("n", n, 1)
-    solid, target = registration.mesh, registration.target
     first, second = solid.surface, target.surface
-    image = registration.image[solid.boundary_vertices]
+    image = mapped.image[solid.boundary_vertices]
     rotation, scale, shift = similarity(first.V, image)
     moved = scale * first.V @ rotation + shift
     there, back = cKDTree(second.V), cKDTree(moved)
@@ -64,8 +70,7 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
     _, home = back.query(second.V[partner])
     edge = np.linalg.norm(np.diff(moved[first.edges], axis=1), axis=2).mean()
     usable = (agree > _SAME_WAY) & (np.linalg.norm(moved[home] - moved, axis=1) < 2.0 * edge)
-    refinement = registration.refinement
-    given = solid.n_vertices - (0 if refinement is None else refinement.n_split)
+    given = solid.n_vertices - _put_in(registration)
     usable &= solid.boundary_vertices < given  # what was put in is no vertex of the source
     chosen: list[int] = []
     nearest = np.where(usable, np.linalg.norm(moved - moved.mean(axis=0), axis=1), -1.0)
@@ -86,3 +91,11 @@ def landmarks_between(registration: Registration, n: int = 36) -> Landmarks:
         solid.boundary_vertices[chosen],
         target.boundary_vertices[partner[chosen]],
     )
+
+
+def _put_in(registration: Registration | LoadedMap) -> int:
+    """Number of vertices of its mesh, the last ones, that the source as given had not."""
+    if isinstance(registration, LoadedMap):
+        counts = ("added_vertices", "boundary_splits")
+        return sum(int(registration.meta.get(name, 0)) for name in counts)
+    return 0 if registration.refinement is None else registration.refinement.n_split

@@ -60,6 +60,26 @@ def test_surfaces_are_mapped_too(folder, capsys) -> None:
     assert record["sd"] < 0.01
 
 
+def test_registrations_with_landmarks_are_guided_by_those_without(tmp_path, monkeypatch) -> None:
+    import registrations
+
+    names = ("one", "other")
+    monkeypatch.setattr(registrations, "NAMES", names)
+    (tmp_path / "meshes").mkdir()
+    for seed, name in enumerate(names):
+        solid = samples.vertebra_like(3_000, seed=seed)
+        np.savez(tmp_path / "meshes" / f"{name}.npz", V=solid.V, T=solid.T)
+    asked = [str(tmp_path), "--out", str(tmp_path), "--threads", "1", "--limit", "2"]
+    assert registrations.main([*asked, "--only", "one to other"]) == 0
+    plain, marked = (
+        json.loads((tmp_path / "register" / f"one-other{suffix}.json").read_text())
+        for suffix in ("", "-landmarks")
+    )
+    assert plain["certified"] and plain["landmarks"] == 0
+    assert marked["certified"] and marked["landmarks"] == registrations.LANDMARKS
+    assert marked["landmark_error"] < 1e-6
+
+
 def test_who_exceeds_the_limit_is_killed_and_recorded(folder: Path) -> None:
     import pool
     from cases import Case

@@ -15,6 +15,7 @@ from stretchmap import _core, samples
 from stretchmap.errors import (
     ArrayError,
     FileFormatError,
+    KindError,
     LandmarkError,
     OptionError,
 )
@@ -285,16 +286,27 @@ def test_landmarks_by_rule(pair):
         landmarks_between(free, 10**5)
     with pytest.raises(OptionError, match="n must be"):
         landmarks_between(free, "3")
-    with pytest.raises(OptionError, match="registration must be"):
+    with pytest.raises(OptionError, match="no target solid"):
         landmarks_between(sm.fill(pair.source, pair.source.surface.V))
+    with pytest.raises(KindError, match="needs the map of a solid"):
+        landmarks_between(sm.area_map(pair.source.surface))
 
 
-def test_suggested_landmarks_are_vertices_of_the_source(pair):
+def test_suggested_landmarks_are_vertices_of_the_source(pair, tmp_path):
     free = register(pair.source, pair.target)
+    free.save(tmp_path / "free.npz")
+    loaded = sm.load_map(tmp_path / "free.npz")
     given = free.mesh.n_vertices // 2  # as if all others had been put in
-    split = SimpleNamespace(n_split=free.mesh.n_vertices - given)
-    assert max(landmarks_between(free, 30).source) >= given
-    assert max(landmarks_between(replace(free, refinement=split), 30).source) < given
+    n_split = free.mesh.n_vertices - given
+    refined = replace(free, refinement=SimpleNamespace(n_split=n_split))
+    whole, part = landmarks_between(free, 30), landmarks_between(refined, 30)
+    assert max(whole.source) >= given
+    assert max(part.source) < given
+    np.testing.assert_array_equal(landmarks_between(loaded, 30).source, whole.source)
+    meta = loaded.meta | {"added_vertices": n_split - 1, "boundary_splits": 1}
+    np.testing.assert_array_equal(
+        landmarks_between(replace(loaded, meta=meta), 30).source, part.source
+    )
 
 
 def test_saving(registered, tmp_path):
