@@ -28,7 +28,9 @@ def for_legacy_vtk(array: NDArray[Any]) -> NDArray[Any]:
     return array.astype(np.int64) if array.dtype.kind in "biu" else array
 
 
-def as_points(points: ArrayLike, name: str = "V", *, or_none: bool = False) -> NDArray[np.float64]:
+def as_points(
+    points: ArrayLike, name: str = "V", *, or_none: bool = False, or_lost: bool = False
+) -> NDArray[np.float64]:
     """Convert points to a read-only C-ordered copy.
 
     Parameters
@@ -38,6 +40,8 @@ def as_points(points: ArrayLike, name: str = "V", *, or_none: bool = False) -> N
         What the caller names the array, for messages.
     or_none : bool
         Whether there may be no point at all, as in a list of queries.
+    or_lost : bool
+        Whether rows may be NaN, all three, which stands for a point outside.
 
     Returns
     -------
@@ -59,14 +63,17 @@ def as_points(points: ArrayLike, name: str = "V", *, or_none: bool = False) -> N
     copy = np.array(_as_doubles(raw, name), dtype=np.float64, order="C")
     if len(copy) > INT32_MAX:
         raise ArrayError(f"{name} has {len(copy)} rows; at most {INT32_MAX} can be indexed")
-    bad = np.flatnonzero(~np.isfinite(copy).all(axis=1))
+    known = np.isfinite(copy).all(axis=1)
+    if or_lost:
+        known |= np.isnan(copy).all(axis=1)
+    bad = np.flatnonzero(~known)
     if len(bad):
         raise NonFiniteError(
             f"{name} has NaN or infinite coordinates at {describe('vertex', bad)}; "
             "replace or remove those vertices",
             bad,
         )
-    if np.abs(copy).max() > LARGEST:
+    if (np.abs(copy) > LARGEST).any():
         bad = np.flatnonzero((np.abs(copy) > LARGEST).any(axis=1))
         raise ArrayError(
             f"{name} has coordinates beyond {LARGEST:g} at {describe('vertex', bad)}, whose "

@@ -62,8 +62,11 @@ class Origin:
     sureness: tuple[float, float, float]
 
     def coordinates(self, given: ArrayLike) -> NDArray[np.float64]:
-        """Coordinates (n, 3) of the map from this origin on, angles in [0, 2 pi)."""
-        uvs = as_points(given, "given", or_none=True)
+        """Coordinates (n, 3) of the map from this origin on, angles in [0, 2 pi).
+
+        Rows of NaN, which a map gives to points outside its solid, stay as they are.
+        """
+        uvs = as_points(given, "given", or_none=True, or_lost=True)
         angles = self.sign * (uvs[:, :2] - [self.u, self.v])
         return np.column_stack([np.mod(angles, TWO_PI), uvs[:, 2]])
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
-from stretchmap.errors import ArrayError, LandmarkError
+from stretchmap.errors import ArrayError, LandmarkError, NonFiniteError
 
 
 @pytest.fixture(scope="module")
@@ -116,3 +116,12 @@ def test_landmarks_that_decide_nothing_are_named(found):
     assert 1 in caught.value.ids
     with pytest.raises(LandmarkError, match="the same point"):
         sm.origin_of(found, found.mesh.V[[5, 5]])
+
+
+def test_points_outside_stay_lost(found):
+    points = np.vstack([found.mesh.V[:3], [1e3, 0.0, 0.0]])
+    origin = sm.origin_of(found)
+    uvs = origin.coordinates(found.coordinates(points))
+    assert np.isfinite(uvs[:3]).all() and np.isnan(uvs[3]).all()
+    with pytest.raises(NonFiniteError, match="at vertex 0"):
+        origin.coordinates([[0.0, np.nan, 0.5]])
