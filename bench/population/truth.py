@@ -54,6 +54,8 @@ def main() -> None:
     parser.add_argument("--along", default="smooth", choices=("smooth", "area"))
     parser.add_argument("--executor", default="serial")
     options = parser.parse_args()
+    if options.shapes < 5:
+        parser.error("four modes are planted: they take at least five shapes to be found")
     for seed in options.seeds:
         bones = sm.samples.vertebra_population(options.shapes, seed, n_tets=options.tets)
         names = [f"{i:02d}" for i in range(options.shapes)]
