@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from .. import _core
+from ..base.rotation import kabsch
 from ..mesh.meshes import TriMesh
 from .procrustes import Similarity
 
@@ -119,9 +120,7 @@ def _improved(
         gaps = p @ rotation + shift - q
         before, value = value, float(np.einsum("n,nx,nx->", weights, gaps, gaps))
         middle, aim = np.einsum("n,nx->x", weights, p), np.einsum("n,nx->x", weights, q)
-        U, _, W = np.linalg.svd(np.einsum("n,ni,nj->ij", weights, p - middle, q - aim))
-        U[:, 2] *= np.sign(np.linalg.det(U @ W))
-        rotation = U @ W
+        rotation, _ = kabsch(np.einsum("n,ni,nj->ij", weights, p - middle, q - aim))
         shift = aim - middle @ rotation
         if before - value <= _AT_REST * value:
             break

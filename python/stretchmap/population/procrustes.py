@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import as_points, as_reals, read_only
 from ..base.options import flag, real
+from ..base.rotation import kabsch
 from ..errors import ArrayError, DegenerateError, SolverError
 
 __all__ = ["Procrustes", "Similarity", "generalized_procrustes", "similarity_onto"]
@@ -116,14 +117,10 @@ def similarity_onto(points: Array, goal: Array, scale: bool = True) -> Similarit
     """
     middle, aim = points.mean(axis=0), goal.mean(axis=0)
     p, q = points - middle, goal - aim
-    U, S, W = np.linalg.svd(np.einsum("ni,nj->ij", p, q))  # einsum: no threads, same bits anywhere
-    turn = np.sign(np.linalg.det(U @ W))
-    U[:, 2] *= turn
-    S[2] *= turn
-    rotation = U @ W
-    if not S.sum() > 0.0:
+    rotation, shares = kabsch(np.einsum("ni,nj->ij", p, q))  # no threads, same bits anywhere
+    if not shares.sum() > 0.0:
         raise DegenerateError("shapes of no extent cannot be laid on each other")
-    factor = float(np.einsum("ni,ni->", q, q) / S.sum()) if scale else 1.0
+    factor = float(np.einsum("ni,ni->", q, q) / shares.sum()) if scale else 1.0
     if not factor > 0.0:
         raise DegenerateError("shapes cannot be laid on a single point")
     return Similarity(rotation, factor, aim - factor * middle @ rotation)

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.rotation import kabsch
 from ..conformal.map import conformal_map
 from ..errors import SolverError
 from ..mesh.meshes import TriMesh
@@ -273,8 +274,6 @@ def _similarity_misfits(
     """Misfit of points (k, 3) and each of the images (c, k, 3) after the best similarity."""
     p = points - points.mean(axis=0)
     q = images - images.mean(axis=1, keepdims=True)
-    U, S, W = np.linalg.svd(np.einsum("ki,ckj->cij", p, q))
-    S[:, 2] *= np.sign(np.linalg.det(U @ W))
-    scale = S.sum(axis=1) / (p**2).sum()
-    left = (q**2).sum(axis=(1, 2)) - scale * S.sum(axis=1)
+    agreement = kabsch(np.einsum("ki,ckj->cij", p, q))[1].sum(axis=1)
+    left = (q**2).sum(axis=(1, 2)) - agreement / (p**2).sum() * agreement
     return np.asarray(np.sqrt(np.maximum(left, 0.0) / len(points)))

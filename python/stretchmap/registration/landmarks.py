@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import INT32_MAX, as_integers, as_reals
 from ..base.options import real
+from ..base.rotation import kabsch
 from ..errors import ArrayError, FileFormatError, LandmarkError
 from ..io.numbers import read_numbers
 from ..mesh.given import as_solid
@@ -200,9 +201,6 @@ def similarity(
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
     """Rotation, scale, shift with ``scale * points @ rotation + shift`` nearest to the images."""
     p, q = points - points.mean(axis=0), images - images.mean(axis=0)
-    U, S, W = np.linalg.svd(p.T @ q)
-    S[2] *= np.sign(np.linalg.det(U @ W))
-    U[:, 2] *= np.sign(np.linalg.det(U @ W))
-    scale = float(S.sum() / (p**2).sum())
-    rotation = U @ W
+    rotation, shares = kabsch(p.T @ q)
+    scale = float(shares.sum() / (p**2).sum())
     return rotation, scale, images.mean(axis=0) - scale * points.mean(axis=0) @ rotation
