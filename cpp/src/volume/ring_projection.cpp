@@ -73,8 +73,10 @@ double RingProjection::error(const PointsRef& x, const VecRef& target) const {
   const Vec current = rings(mesh::tet_volumes(x, tets_));
   double worst = 0.0;
   for (Index i = 0; i < fixed_.size(); ++i) {
+    if (fixed_[i]) continue;
     const double off = std::abs(current[i] / target[i] - 1.0);
-    if (!fixed_[i] && !(off <= worst)) worst = off;  // one that is no number is the worst
+    if (std::isnan(off)) return off;
+    worst = std::max(worst, off);
   }
   return worst;
 }

@@ -339,7 +339,16 @@ def test_rings_that_no_free_vertex_changes_are_refused():
     projection = _core.volume.RingProjection(star.T, fixed)
     with pytest.raises(SolverError, match="do not depend on any free vertex"):
         projection.step(star.V, np.full(7, 2.0 * star.volume), 1e-4, 100)
-    assert not projection.error(star.V, np.full(7, np.nan)) < 1.0
+
+
+def test_a_ring_whose_volume_is_no_number_is_the_worst(bumpy):
+    projection = _core.volume.RingProjection(bumpy.T, np.zeros(bumpy.n_vertices, np.uint8))
+    rings = np.ones(bumpy.n_vertices)
+    assert np.isfinite(projection.error(bumpy.V, rings))
+    for i in (0, bumpy.n_vertices - 1):
+        spoilt = rings.copy()
+        spoilt[i] = np.nan
+        assert np.isnan(projection.error(bumpy.V, spoilt))
 
 
 def test_refinement_is_reported_or_refused(load_solid):
