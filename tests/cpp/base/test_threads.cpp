@@ -84,11 +84,11 @@ TEST_CASE("a loop in a shared loop, and loops of several threads at once") {
   for (const double sum : sums) CHECK(sum == sums[0]);
 }
 
-TEST_CASE("small loops stay with the thread that begins them") {
+TEST_CASE("a loop of one chunk stays with the thread that begins it") {
   const ThreadCount count(4);
   const std::thread::id own = std::this_thread::get_id();
   bool alone = true;
-  stretchmap::for_rows(3 * stretchmap::kChunk, [&](Index) {
+  stretchmap::for_rows(stretchmap::kChunk, [&](Index) {
     if (std::this_thread::get_id() != own) alone = false;
   });
   CHECK(alone);
