@@ -7,8 +7,8 @@
     python bench/robustness/run.py --write                      # and put the tables into the docs
 
 Each case gets a record OUT/KIND/GROUP_NAME.json beside its map and runs in a process of its own,
-killed at 1 ms of processor time per tet, or 20 ms per face (`--limit`). A second run goes on where
-the first stopped; `--again` starts anew.
+told its limit and killed at it, 1 ms of processor time per tet, or 20 ms per face (`--limit`). A
+second run goes on where the first stopped; `--again` starts anew.
 """
 
 from __future__ import annotations

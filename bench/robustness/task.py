@@ -63,15 +63,16 @@ def load(path: str) -> sm.TetMesh | sm.TriMesh:
 
 
 def map_volume(mesh: sm.TetMesh, job: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """The default volume map, the best one kept where it is not certified."""
-    result = sm.volume_map(mesh, keep_best=True)
+    """The default volume map within the limit, the best one kept where it is not certified."""
+    options = sm.VolumeOptions(time_limit=job["per_element"])
+    result = sm.volume_map(mesh, options=options, keep_best=True)
     return result, figures.of_solid_map(mesh, result)
 
 
 def map_area(mesh: sm.TetMesh | sm.TriMesh, job: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """The default area map of a surface, or of the boundary of a solid."""
+    """The default area map of a surface, or of the boundary of a solid, within the limit."""
     surface = mesh.surface if isinstance(mesh, sm.TetMesh) else mesh
-    result = sm.area_map(surface, keep_best=True)
+    result = sm.area_map(surface, time_limit=job["per_element"], keep_best=True)
     proof = sm.certify(result.mesh, result.image, result.torus)
     added = 0 if result.refinement is None else result.refinement.n_added_faces
     return result, figures.of_ratios(result.distortion.ratios) | {
