@@ -11,8 +11,10 @@ void bind(py::module_& m) {
         return jacobian_coefficients(x);
       },
       py::arg("corners"), "Of one hexahedron, for checks.");
-  m.def("valid_hexes", &valid_hexes, py::arg("points").noconvert(), py::arg("hexes").noconvert(),
-        release_gil());
+  m.def(
+      "valid_hexes",
+      [](const PointsRef& x, const HexesRef& h) { return valid_hexes(x, h, signal_poll()); },
+      py::arg("points").noconvert(), py::arg("hexes").noconvert(), release_gil());
   m.def("scaled_jacobians", &scaled_jacobians, py::arg("points").noconvert(),
         py::arg("hexes").noconvert(), release_gil());
   m.def("corner_sides", &corner_sides, py::arg("points").noconvert(), py::arg("hexes").noconvert(),

@@ -18,6 +18,7 @@ constexpr int kMostHalvings = 60;  // twenty of each direction
 // Parts of one hexahedron that are looked at: one whose determinant comes near zero along a surface
 // has their number grow with every halving, and counts as not proven positive.
 constexpr int kMostParts = 10'000'000;  // half a second
+constexpr Index kBatch = 1024;          // hexahedra between two polls
 constexpr int kStride[3] = {9, 3, 1};
 
 // Corner at the ends (i, j, k) of the three directions.
@@ -188,13 +189,16 @@ Coefficients jacobian_coefficients(const Corners& x) {
   return b;
 }
 
-Flags valid_hexes(const PointsRef& points, const HexesRef& hexes) {
+Flags valid_hexes(const PointsRef& points, const HexesRef& hexes, const Poll& poll) {
   const Index k = static_cast<Index>(hexes.rows());
   Flags valid(k);
-  for_rows(k, kElementChunk, [&](Index h) {
-    const Corners x = corners_of(points, hexes, h);
-    valid[h] = positive(jacobian_coefficients(x), rounding_bound(x));
-  });
+  for (Index begin = 0; begin < k; begin += kBatch) {
+    if (poll) poll();
+    for_rows(std::min(kBatch, k - begin), kCostlyChunk, [&](Index row) {
+      const Corners x = corners_of(points, hexes, begin + row);
+      valid[begin + row] = positive(jacobian_coefficients(x), rounding_bound(x));
+    });
+  }
   return valid;
 }
 

@@ -56,7 +56,7 @@ std::array<double, 27> jacobian_coefficients(const std::array<Eigen::Vector3d, 8
 // as not positive.
 //
 // \param points (n, 3). \param hexes (k, 8), ids below n. \return (k) 1 for valid, else 0.
-Flags valid_hexes(const PointsRef& points, const HexesRef& hexes);
+Flags valid_hexes(const PointsRef& points, const HexesRef& hexes, const Poll& poll = {});
 
 // \return (k, 8) Jacobian at each corner over the product of the three edge lengths there; 0 where
 // an
