@@ -12,7 +12,7 @@ from ..base.budget import Budget
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
-from ..base.torus import MOST_RADIANS, TWO_PI, Torus
+from ..base.torus import MOST_ANGLE, TWO_PI, Torus
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import CertificationError, OptionError
 from ..homology.basis import HomologyBasis
@@ -290,7 +290,7 @@ def _check_options(
     torus: Torus | None, phase: float | None, ratio: str | float, finish: str
 ) -> None:
     if phase is not None:
-        real("phase", phase, -MOST_RADIANS, MOST_RADIANS)
+        real("phase", phase, -MOST_ANGLE, MOST_ANGLE)
     if isinstance(ratio, str):
         one_of("ratio", ratio, ("conformal", "search"))
     else:

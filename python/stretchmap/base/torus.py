@@ -15,7 +15,7 @@ from .options import real
 __all__ = ["Torus"]
 
 TWO_PI = 2.0 * math.pi
-MOST_RADIANS = 1e3  # of an angle that is given; far beyond, rounding would show
+MOST_ANGLE = 1e3  # given, in radians or turns; far beyond, rounding would show
 
 
 def wrapped(turns: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -30,7 +30,7 @@ from .. import _core
 from ..base.arrays import read_only
 from ..base.options import flag, real, whole
 from ..base.tables import HasSummary, plain_dict, table
-from ..base.torus import MOST_RADIANS
+from ..base.torus import MOST_ANGLE
 from ..errors import OptionError, SolverError
 from ..maps.given import as_map_of_solid, torus_of
 from ..maps.result import MapResult
@@ -245,7 +245,7 @@ def partition(
     """
     mapped, source = as_map_of_solid(result, "a partition")
     axes, shares = asked_shares(fractions, by, source.n_tets)
-    start, correct = real("start", start, -MOST_RADIANS, MOST_RADIANS), flag("correct", correct)
+    start, correct = real("start", start, -MOST_ANGLE, MOST_ANGLE), flag("correct", correct)
     pieces = Pieces.of(source, mapped.image, torus_of(mapped))
     uncorrected = [
         levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..area.search import Ratio
 from ..base.options import SOLVERS, flag, instance, one_of, real, shown, whole
-from ..base.torus import MOST_RADIANS
+from ..base.torus import MOST_ANGLE
 from ..errors import OptionError
 
 __all__ = ["FillOptions", "VolumeOptions", "balanced", "check_call", "free_at", "weight_at"]
@@ -190,7 +190,7 @@ class VolumeOptions(FillOptions):
         elif self.ratio is not None:
             real("ratio", self.ratio, above=1.0)
         if self.phase is not None:
-            real("phase", self.phase, -MOST_RADIANS, MOST_RADIANS)
+            real("phase", self.phase, -MOST_ANGLE, MOST_ANGLE)
         if self.tol is not None:
             real("tol", self.tol, 0.0, below=1.0)
         for name in ("target_iter", "shift_iter"):
