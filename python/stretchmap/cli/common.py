@@ -91,15 +91,16 @@ def read_with_fields(path: Path, orient: bool, compact: bool) -> tuple[TriMesh |
     if compact:
         mesh, kept = mesh.compact()
         points = {name: array[kept] for name, array in points.items()}
-    return mesh, (_carried(points), _carried(arrays.cell_data))
+    saved = "image" in points  # a map: of what it holds itself the new one has its own
+    return mesh, (_carried(points, saved), _carried(arrays.cell_data, saved))
 
 
-def _carried(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers, but for those of a map that was saved with its mesh: the new one has its own."""
+def _carried(data: Mapping[str, Any], saved: bool) -> dict[str, Any]:
+    """Numbers, but for those of a map that was saved."""
     from ..maps.fields import OF_MAPS
 
     numbers = {k: a for k, a in data.items() if a.dtype.kind in "biuf" and a.ndim in (1, 2)}
-    return {k: a for k, a in numbers.items() if k not in OF_MAPS}
+    return {k: a for k, a in numbers.items() if not (saved and k in OF_MAPS)}
 
 
 def surface_of(mesh: TriMesh | TetMesh) -> TriMesh:

@@ -145,6 +145,16 @@ def test_fields_of_a_saved_map_are_not_carried_along(folder, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_fields_named_like_those_of_maps_are_left_out_with_a_word(folder, capsys):
+    pytest.importorskip("meshio")
+    surface = sm.read("surface.ply")
+    sm.write("flow.vtu", surface, point_data={"u": surface.V[:, 0], "load": surface.V[:, 1]})
+    assert main(["conformal", "flow.vtu", "-o", "map.vtu"]) == 0
+    said = capsys.readouterr().err
+    assert "left out: u;" in said and "load" not in said
+    assert "load" in sm.io.read_arrays("map.vtu").point_data
+
+
 def test_start_from_another_solids_map_is_refused(folder, capsys):
     sm.write("other.npz", samples.solid_torus(2500))
     assert main(["volume", "other.npz", "-o", "o.npz", "--c", "0", "--max-iter", "1", "-q"]) == 0
