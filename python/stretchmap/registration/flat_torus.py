@@ -275,5 +275,6 @@ def _similarity_misfits(
     p = points - points.mean(axis=0)
     q = images - images.mean(axis=1, keepdims=True)
     agreement = kabsch(np.einsum("ki,ckj->cij", p, q))[1].sum(axis=1)
-    left = (q**2).sum(axis=(1, 2)) - agreement / (p**2).sum() * agreement
+    scale = agreement / (p**2).sum()
+    left = (q**2).sum(axis=(1, 2)) - scale * agreement
     return np.asarray(np.sqrt(np.maximum(left, 0.0) / len(points)))
