@@ -9,7 +9,7 @@ from ..errors import KindError, OptionError
 from ..mesh.meshes import TetMesh
 from .result import MapResult
 
-__all__ = ["as_map", "as_map_of_solid", "torus_of"]
+__all__ = ["as_map", "as_map_of_solid", "target_of", "torus_of"]
 
 
 def as_map(result: Any, name: str = "result") -> MapResult:
@@ -53,3 +53,16 @@ def torus_of(result: MapResult) -> Torus:
     if result.torus is None:
         raise OptionError("the map has no torus, so there are no coordinates on it")
     return result.torus
+
+
+def target_of(result: MapResult, task: str) -> TetMesh:
+    """The solid a registration goes to.
+
+    Raises
+    ------
+    OptionError
+        The map goes to a torus, or its file names no target.
+    """
+    if result.target is None:
+        raise OptionError(f"{task} needs a registration; this map has no target solid")
+    return result.target

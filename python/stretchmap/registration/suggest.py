@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.options import whole
-from ..errors import LandmarkError, OptionError
+from ..errors import LandmarkError
 from ..maps.files import LoadedMap
-from ..maps.given import as_map_of_solid
+from ..maps.given import as_map_of_solid, target_of
 from ..mesh.normals import vertex_normals
 from .landmarks import Landmarks, similarity
 from .result import Registration
@@ -55,9 +55,7 @@ def landmarks_between(registration: Registration | LoadedMap, n: int = 36) -> La
     4
     """
     mapped, solid = as_map_of_solid(registration, "finding landmarks")
-    target = mapped.target
-    if target is None:
-        raise OptionError("landmarks are found by a registration; this map has no target solid")
+    target = target_of(mapped, "finding landmarks")
     n = whole("n", n, 1)
     first, second = solid.surface, target.surface
     image = mapped.image[solid.boundary_vertices]

@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from ..base.arrays import as_reals
 from ..base.options import one_of
-from ..errors import DegenerateError, OptionError
-from ..maps.given import as_map_of_solid
+from ..errors import DegenerateError
+from ..maps.given import as_map_of_solid, target_of
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 
@@ -75,9 +75,7 @@ def transfer(
     True
     """
     registration, solid = as_map_of_solid(registration, "carrying a field")
-    target = registration.target
-    if target is None:
-        raise OptionError("a field is carried by a registration; this map has no target solid")
+    target = target_of(registration, "carrying a field")
     one_of("conserve", conserve, ("integral", "mean"))
     one_of("per", per, ("vertex", "tet"))
     for mesh, name in ((solid, "source"), (target, "target")):
