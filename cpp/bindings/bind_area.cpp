@@ -8,6 +8,7 @@
 #include "stretchmap/area/phase_energies.hpp"
 #include "stretchmap/area/straight_drawing.hpp"
 #include "stretchmap/area/surface_newton.hpp"
+#include "stretchmap/area/surface_patch.hpp"
 #include "stretchmap/area/surface_reference.hpp"
 #include "stretchmap/area/surface_sem.hpp"
 
@@ -109,8 +110,20 @@ void bind_glide(py::module_& m) {
            }),
            py::kw_only(), py::arg("area") = 1.0, py::arg("shape") = 0.0, py::arg("chart") = 0.0,
            py::arg("facing") = 0.0, py::arg("epsilon") = 0.0);
+  py::class_<SurfacePatch>(m, "SurfacePatch")
+      .def(py::init([](const SurfaceNewton& newton, const std::vector<Index>& faces, int rings) {
+             return surface_patch(newton.problem(), faces, rings);
+           }),
+           py::arg("newton"), py::arg("faces"), py::arg("rings"), release_gil())
+      .def_readonly("problem", &SurfacePatch::problem)
+      .def_readonly("vertices", &SurfacePatch::vertices)
+      .def_readonly("held", &SurfacePatch::held)
+      .def_property_readonly("n_faces", [](const SurfacePatch& self) {
+        return self.problem.chart.faces.rows();
+      });
   py::class_<SurfaceNewton>(m, "SurfaceNewton")
-      .def(py::init<GlideProblem, Points2>(), py::arg("problem"), py::arg("angles"), release_gil())
+      .def(py::init<GlideProblem, Points2, Flags>(), py::arg("problem"), py::arg("angles"),
+           py::arg("held") = Flags(), release_gil())
       .def(
           "step",
           [](SurfaceNewton& self, const SurfaceWeights& weights) {
@@ -128,10 +141,12 @@ void bind_glide(py::module_& m) {
           py::arg("most_best"), release_gil())
       .def("measures", &SurfaceNewton::measures, release_gil())
       .def("least_facing", &SurfaceNewton::facing, release_gil())
+      .def("inward", &SurfaceNewton::inward, release_gil())
       .def("flops", &SurfaceNewton::flops, release_gil())
       .def_property_readonly("solves", &SurfaceNewton::solves)
       .def_property_readonly("curvature", &SurfaceNewton::curvature)
-      .def_property_readonly("angles", &SurfaceNewton::angles, py::return_value_policy::copy);
+      .def_property("angles", &SurfaceNewton::angles, &SurfaceNewton::move_to,
+                    py::return_value_policy::copy);
 }
 
 }  // namespace

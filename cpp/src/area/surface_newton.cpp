@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stretchmap/base/errors.hpp"
+#include "stretchmap/base/parallel.hpp"
 #include "stretchmap/base/torus.hpp"
 #include "stretchmap/certificate/torus_graph.hpp"
 #include "stretchmap/linalg/backtrack.hpp"
@@ -39,9 +40,10 @@ Points2 without_rotation(Points2 direction) {
 
 }  // namespace
 
-SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles)
+SurfaceNewton::SurfaceNewton(GlideProblem problem, Points2 angles, Flags held)
     : problem_(std::move(problem)),
       angles_(std::move(angles)),
+      held_(std::move(held)),
       damping_(Eigen::Vector2d(problem_.ratio, 1.0), kTwoPi) {
   const std::vector<Index> faces = folded_faces(problem_.chart, angles_ / kTwoPi);
   if (!faces.empty())
@@ -56,7 +58,7 @@ NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) 
   rings_.reset();
   const auto solve = [&](const Rows& hessians) {
     ++solves_;
-    return without_rotation(as_rows(system().solve(hessians, here.gradient, poll)));
+    return direction_of(hessians, here.gradient, poll);
   };
   const auto [direction, longest] = damping_.direction(
       problem_.chart, angles_ / kTwoPi, problem_.reference.weights, here.hessians, solve);
@@ -79,6 +81,26 @@ NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) 
     result.after = there;
   }
   return result;
+}
+
+// Without rows and columns of vertices that are held: the ridge is left of them.
+Points2 SurfaceNewton::direction_of(const Rows& hessians, const Vec& gradient, const Poll& poll) {
+  if (held_.size() == 0)
+    return without_rotation(as_rows(system().solve(hessians, gradient, poll)));
+  Rows free = hessians;
+  Vec pull = gradient;
+  const Faces& faces = problem_.chart.faces;
+  for_rows(static_cast<Index>(free.rows()), kElementChunk, [&](Index f) {
+    Eigen::Map<Eigen::Matrix<double, 6, 6>> hessian(free.row(f).data());
+    for (int k = 0; k < 3; ++k) {
+      if (!held_(faces(f, k))) continue;
+      hessian.middleRows<2>(2 * k).setZero();
+      hessian.middleCols<2>(2 * k).setZero();
+    }
+  });
+  for (Index i = 0; i < held_.size(); ++i)
+    if (held_(i)) pull.segment<2>(2 * i).setZero();
+  return as_rows(system().solve(free, pull, poll));
 }
 
 ChartSystem& SurfaceNewton::system() {

@@ -4,7 +4,7 @@ import numpy
 import numpy.typing
 import stretchmap._core.mesh
 import typing
-__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'coarsen', 'edge_sags', 'phase_energies', 'prolong', 'straight_drawing', 'turn_areas']
+__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfacePatch', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'coarsen', 'edge_sags', 'phase_energies', 'prolong', 'straight_drawing', 'turn_areas']
 class SurfaceChart:
     def __init__(self, topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]) -> None:
         ...
@@ -102,10 +102,27 @@ class GlideProblem:
 class SurfaceWeights:
     def __init__(self, *, area: typing.SupportsFloat | typing.SupportsIndex = 1.0, shape: typing.SupportsFloat | typing.SupportsIndex = 0.0, chart: typing.SupportsFloat | typing.SupportsIndex = 0.0, facing: typing.SupportsFloat | typing.SupportsIndex = 0.0, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
+class SurfacePatch:
+    def __init__(self, newton: ..., faces: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], rings: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def held(self) -> typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"]:
+        ...
+    @property
+    def n_faces(self) -> int:
+        ...
+    @property
+    def problem(self) -> GlideProblem:
+        ...
+    @property
+    def vertices(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        ...
 class SurfaceNewton:
-    def __init__(self, problem: GlideProblem, angles: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None:
+    def __init__(self, problem: GlideProblem, angles: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"], held: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8, "[m, 1]"] = ...) -> None:
         ...
     def flops(self) -> float:
+        ...
+    def inward(self) -> list[int]:
         ...
     def least_facing(self) -> float:
         ...
@@ -117,6 +134,9 @@ class SurfaceNewton:
         ...
     @property
     def angles(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        ...
+    @angles.setter
+    def angles(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 2]"]) -> None:
         ...
     @property
     def curvature(self) -> float:

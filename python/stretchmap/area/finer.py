@@ -33,12 +33,15 @@ from .finish import (
     worth_rings,
 )
 from .flat import start_angles
+from .patches import turn_in_patches
 from .route import Made
 from .work import MOST_FACES, RINGS, Work
 
 _log = logging.getLogger("stretchmap")
 
-_SAG = 1.0  # most sag of an edge, over the heights its faces are to have above it
+# Most sag of an edge, over the heights its faces are to have above it; the first of them for which
+# there may be enough faces.
+_SAGS = 1.0, 1.4, 2.0, 2.8
 _FAR, _MANY = 2.0, 0.005  # more than this share of the edges with more sag than that: too coarse
 # Faces there may be: so many times those of the input, and so many more; still more where work is
 # left for so many steps, to begin with and after each approach.
@@ -47,9 +50,8 @@ _BENT = 0.5  # least share of its area that a face may keep when the flat chart 
 _PASSES = 14
 _TWINS = 2  # rounds in which the other long edges of needles follow: more cost more than they give
 _MORE = 3  # times as many faces that look inward as before: halving edges does not help
-_APPROACH = 10, 10, 10  # most steps towards areas, edges that sag too much halved after each
-# Face SD after the first of them from which on others lead no nearer, and nothing does.
-_HOPELESS, _LOST = 0.3, 0.5
+_APPROACH = 30, 10, 10  # most steps towards areas, edges that sag too much halved after each
+_LOST = 0.5  # face SD from which on others lead no nearer
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
@@ -238,6 +240,13 @@ class Finer:
             finer = finer.halved_with_twins(marked)
         return finer.outward()
 
+    def fitted_as_affordable(self) -> Finer:
+        """With edges halved until none sags more than there may be faces for."""
+        for sag in _SAGS:
+            if (finer := self.fitted(sag)) is not None:
+                return finer
+        return self.outward()
+
     def outward(self) -> Finer:
         """With the edges halved that sag most in faces that look inward, while there are any.
 
@@ -275,24 +284,25 @@ class Finer:
     ) -> tuple[Finer, Pace, list[IterationRecord]]:
         """With areas nearly right, edges that sag too much meanwhile halved, too; pace, records."""
         finer, pace, history = replace(self, near=True), Pace(), []
+        same = Pace()
         for most, after in zip(_APPROACH, STEPS_LEFT[1:], strict=True):
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
             work.begin(newton, n_faces)
             affordable = work.steps(n_faces) - _LEAST_STEPS
             if affordable <= 0:
                 break
-            records, reached = approach_areas(newton, min(most, affordable), progress, work.late)
-            pace = max(pace, reached, key=lambda each: each.weight)
+            most = min(most, affordable)
+            records, same = approach_areas(newton, most, progress, work.late, same)
+            pace = max(pace, same, key=lambda each: each.weight)
             work.spend_on_approach(len(records), n_faces)
             history += records
             finer = replace(finer, angles=newton.angles, affordable=work.most_faces(after))
-            error = newton.measures().face_std
-            if error > _LOST:
+            if newton.measures().face_std > _LOST:
                 break
-            finer = finer.fitted(_SAG) or finer.outward()
+            finer = finer.fitted_as_affordable()
             work.spend_on_fitting(finer.level.surface.n_faces)
-            if error > _HOPELESS:
-                break
+            if finer.level.surface.n_faces > n_faces:
+                same = Pace()
         return finer, pace, history
 
     def newton(self) -> _core.area.SurfaceNewton:
@@ -375,6 +385,9 @@ def mapped_finer(
 
     def turned_outward(newton: _core.area.SurfaceNewton, n_faces: int, pace: Pace) -> bool:
         """Whether every face looks outward, some steps later if need be."""
+        if newton.least_facing() > 0.0:
+            return True
+        history.extend(turn_in_patches(newton, progress, pace, work, work.late))
         if newton.least_facing() > 0.0:
             return True
         affordable = work.steps(n_faces)

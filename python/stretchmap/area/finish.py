@@ -25,6 +25,9 @@ _PUSH = 10.0  # weight of facing where areas are nearly right and are to stay so
 _GROWTH, _MOST_WEIGHT = 4.0, 4.0**9  # more of it leaves nothing of the barriers
 _LIGHT = 4.0**3  # more of it from afar lets faces that are too coarse stand up from the torus
 _NEAR = 0.1  # face SD up to which steps may let faces look inward
+# After so many steps towards areas they go on while so many more lower the least face SD to less
+# than that share of it, until it is low enough for edges to be halved.
+_SURE, _LOOK, _FALLS, _FAR = 10, 5, 0.9, 0.25
 _FULL_STEP = 0.5  # a step at least this long lets the area term grow
 # Barriers much lighter than the error let steps run up against them; so heavy they are at least, in
 # units of its square, less by a factor where long steps gain less than that share of the energy;
@@ -173,22 +176,31 @@ def approach_areas(
     most: int,
     progress: Progress | None,
     late: Callable[[], bool] | None = None,
+    pace: Pace | None = None,
 ) -> tuple[list[IterationRecord], Pace]:
     """Newton steps until areas are nearly right, whichever way faces look meanwhile; their pace.
 
-    From afar the barrier against faces that look inward leaves but short steps.
+    From afar the barrier against faces that look inward leaves but short steps. What steps follow
+    on others of the same surface goes on at their pace.
     """
     start = time.perf_counter()
     history: list[IterationRecord] = []
-    pace, shape, at_rest = Pace(), _shape_weight(newton), _rest()
+    pace = Pace() if pace is None else replace(pace)
+    shape, at_rest, lowest = _shape_weight(newton), _rest(), [newton.measures().face_std]
     while len(history) < most and newton.measures().face_std > _NEAR:
         if late is not None and late():
+            break
+        if len(history) >= _SURE and (
+            newton.measures().face_std <= _FAR
+            or (len(history) % _LOOK == 0 and lowest[-1] > _FALLS * lowest[-1 - _LOOK])
+        ):
             break
         taken = newton.step(_weights(pace.weight, 0.0, shape))
         if taken.step >= _FULL_STEP:
             pace.weight = min(pace.weight * _GROWTH, _LIGHT)
         history.append(_record("approach", len(history) + 1, taken, newton.measures(), start))
         report(progress, "area", len(history), most, face_std=history[-1].element_std)
+        lowest.append(min(lowest[-1], history[-1].element_std))
         if at_rest(taken):
             break
     return history, pace

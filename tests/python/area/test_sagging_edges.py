@@ -247,6 +247,41 @@ def test_faces_left_inward_are_turned_where_areas_are_nearly_right() -> None:
     assert np.mean(by_pace) < 0.65 * np.mean(without)
 
 
+def test_steps_towards_areas_go_on_while_these_get_better(monkeypatch) -> None:
+    start = Finer.wrapped(*eased(small_handle(0, 3.4))).fitted(3.0)
+    assert start is not None
+    monkeypatch.setattr(finish, "_SURE", 2)
+    monkeypatch.setattr(finish, "_LOOK", 1)
+    records, pace = approach_areas(start.newton(), 30, None)
+    stds = [record.element_std for record in records]
+    assert len(records) > 2 and stds[-1] <= 0.25 < stds[-2] and pace.weight > 4.0
+    monkeypatch.setattr(finish, "_FALLS", 0.0)  # no step is good enough
+    newton = start.newton()
+    records, pace = approach_areas(newton, 30, None)
+    assert len(records) == 2
+    # Steps that follow on the same surface go on at that pace, and do no harm.
+    before, weight = newton.measures().face_std, pace.weight
+    follow, faster = approach_areas(newton, 2, None, None, pace)
+    assert pace.weight == weight <= faster.weight and follow[-1].element_std < before
+
+
+def test_edges_may_sag_more_where_faces_are_few() -> None:
+    start = Finer.wrapped(*eased(small_handle(0, 3.2)))
+    start = dataclasses.replace(start, affordable=10**5).fitted(3.0)
+    assert start is not None
+    newton = start.newton()
+    approach_areas(newton, 10, None)
+    near = dataclasses.replace(start, angles=newton.angles, near=True)
+    fine = near.fitted_as_affordable()
+    assert (fine.sags() > 1.0).mean() < 0.005
+    most = near.level.surface.n_faces + 1000
+    few = dataclasses.replace(near, affordable=most)
+    assert few.fitted(1.0) is None and few.fitted(1.4) is None
+    found = few.fitted_as_affordable()
+    assert near.level.surface.n_faces < found.level.surface.n_faces <= most
+    assert (found.sags() > 2.0).mean() < 0.005 < (found.sags() > 1.0).mean()
+
+
 @pytest.mark.parametrize("turns", [9, 11, -8])
 def test_edges_whose_ends_meet_again_are_long(turns: int) -> None:
     """A grid sheared so far that edges of its columns go most of the way round the torus."""

@@ -69,6 +69,7 @@ def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
         halved.append(self)
         return self
 
+    monkeypatch.setattr(finer, "turn_in_patches", lambda *_: [])
     monkeypatch.setattr(finer, "unfold_faces", unfold)
     monkeypatch.setattr(Finer, "outward", outward)
     made = Made(start.angles, 0.0, start.ratio, [])
@@ -87,6 +88,7 @@ def test_edges_of_the_last_few_folded_faces_are_halved(monkeypatch) -> None:
     start = rough.halved(np.arange(len(rough.sags())) == 0)
     monkeypatch.setattr(Finer, "approached", lambda self, *_: (self, Pace(), []))
     monkeypatch.setattr(finer, "many_folded", lambda *_: False)
+    monkeypatch.setattr(finer, "turn_in_patches", lambda *_: [])
     monkeypatch.setattr(finer, "unfold_faces", lambda *_: [])  # no step turns any
     made = Made(start.angles, 0.0, start.ratio, [])
     work = Work(start.level.surface.n_faces, 1e9, 40, reserved=0.25)

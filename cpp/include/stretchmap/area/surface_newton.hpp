@@ -3,6 +3,8 @@
 #pragma once
 
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "stretchmap/area/chart_system.hpp"
 #include "stretchmap/area/face_damping.hpp"
@@ -16,8 +18,9 @@ class SurfaceNewton {
  public:
   // \param problem its reference as surface_reference gives it.
   // \param angles (n, 2) without faces flipped in the chart.
+  // \param held (n) nonzero for vertices that stay where they are; empty: none does.
   // \throws Error "SolverError" if a face is flipped in the chart (ids: faces).
-  SurfaceNewton(GlideProblem problem, Points2 angles);
+  SurfaceNewton(GlideProblem problem, Points2 angles, Flags held = {});
 
   // The scale of the areas is renewed first, which lowers the energy by itself.
   // \return before, after: with this step's weights and scale.
@@ -37,6 +40,8 @@ class SurfaceNewton {
 
   // As least_facing.
   double facing() const { return least_facing(problem_, angles_); }
+  // \return the faces that do not look outward.
+  std::vector<Index> inward() const { return faces_inward(problem_, angles_); }
 
   // Of the elimination in a step that needs one.
   double flops();
@@ -46,14 +51,18 @@ class SurfaceNewton {
   double curvature() const { return curvature_; }
 
   const Points2& angles() const { return angles_; }
+  // \pre no face is flipped in the chart.
+  void move_to(Points2 angles) { angles_ = std::move(angles); }
   const GlideProblem& problem() const { return problem_; }
 
  private:
   ChartSystem& system();
+  Points2 direction_of(const Rows& hessians, const Vec& gradient, const Poll& poll);
   double longest_step(const Points2& direction) const;
 
   GlideProblem problem_;
   Points2 angles_;
+  Flags held_;
   FaceDamping damping_;
   int solves_ = 0;
   double curvature_ = kModelCurvature;
