@@ -118,9 +118,8 @@ void bind_glide(py::module_& m) {
       .def_readonly("problem", &SurfacePatch::problem)
       .def_readonly("vertices", &SurfacePatch::vertices)
       .def_readonly("held", &SurfacePatch::held)
-      .def_property_readonly("n_faces", [](const SurfacePatch& self) {
-        return self.problem.chart.faces.rows();
-      });
+      .def_property_readonly(
+          "n_faces", [](const SurfacePatch& self) { return self.problem.chart.faces.rows(); });
   py::class_<SurfaceNewton>(m, "SurfaceNewton")
       .def(py::init<GlideProblem, Points2, Flags>(), py::arg("problem"), py::arg("angles"),
            py::arg("held") = Flags(), release_gil())

@@ -85,8 +85,7 @@ NewtonStep SurfaceNewton::step(const SurfaceWeights& weights, const Poll& poll) 
 
 // Without rows and columns of vertices that are held: the ridge is left of them.
 Points2 SurfaceNewton::direction_of(const Rows& hessians, const Vec& gradient, const Poll& poll) {
-  if (held_.size() == 0)
-    return without_rotation(as_rows(system().solve(hessians, gradient, poll)));
+  if (held_.size() == 0) return without_rotation(as_rows(system().solve(hessians, gradient, poll)));
   Rows free = hessians;
   Vec pull = gradient;
   const Faces& faces = problem_.chart.faces;

@@ -14,7 +14,7 @@ from ..mesh.surfaces import TriMesh
 _EACH, _LEAST = 1200.0, 5e6
 # Where edges may be halved, so many for each second there is, no more than a slow processor gets
 # done; and a face for so many, where steps are left for them.
-_A_SECOND, _A_FACE = 4.5e5, 430.0
+_A_SECOND, _A_FACE = 4.5e5, 330.0
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
 MOST_FACES = 10**6  # of a surface with edges halved
