@@ -145,7 +145,8 @@ def area_map(
     much are halved in the chart before anything else, which is eased a little towards shapes for
     it, further where that takes too many faces. Newton steps that let faces look inward lead to
     nearly right areas, edges that sag too much by then are halved, too, as are those of faces left
-    looking inward; then the steps above follow. Where areas stay off, the edges that sag most in
+    looking inward; the last of these are turned in patches with the rest held, before the steps
+    above follow. Where areas stay off, the edges that sag most in
     faces that are off are halved, three times at most, on surfaces of more than 40,000 faces, too.
     There become no more than 25 times as many faces with the usual ``time_limit``, in proportion
     with another, and 2.5 times as many and 12,000 at any rate; but never more than a million. All
