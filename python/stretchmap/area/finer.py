@@ -387,7 +387,7 @@ def mapped_finer(
         """Whether every face looks outward, some steps later if need be."""
         if newton.least_facing() > 0.0:
             return True
-        history.extend(turn_in_patches(newton, progress, pace, work, work.late))
+        history.extend(turn_in_patches(newton, progress, pace, work))
         if newton.least_facing() > 0.0:
             return True
         affordable = work.steps(n_faces)

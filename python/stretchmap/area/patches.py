@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from dataclasses import replace
 
 from .. import _core
 from ..base.progress import Progress
@@ -20,7 +21,6 @@ def turn_in_patches(
     progress: Progress | None,
     pace: Pace,
     work: Work,
-    late: Callable[[], bool] | None = None,
 ) -> list[IterationRecord]:
     """Newton steps on the patches round faces that look inward, until none does; records.
 
@@ -36,7 +36,9 @@ def turn_in_patches(
         if len(patch.vertices) > _WHOLE * len(angles):
             break
         part = _core.area.SurfaceNewton(patch.problem, angles[patch.vertices], patch.held)
-        history += unfold_faces(part, _MOST, progress, pace, late)
+        records = unfold_faces(part, _MOST, progress, pace, work.late)
+        # Areas are compared within the patch there.
+        history += [replace(r, ring_std=math.nan, element_std=math.nan) for r in records]
         work.spend(part.solves, patch.n_faces)
         angles[patch.vertices] = part.angles
         newton.angles = angles

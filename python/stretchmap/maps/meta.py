@@ -17,6 +17,7 @@ __all__ = ["read_history", "read_meta", "summary_rows"]
 _DEEPEST = 20  # lists and objects within each other
 # Fields of records that files of version 0.1 call otherwise.
 _NAMES_OF_0_1 = {"ring_sd": "ring_std", "element_sd": "element_std"}
+_COUNTS = "added_vertices", "boundary_splits"
 _KINDS: dict[str, tuple[type, ...]] = {"stage": (str,), "iteration": (int,), "flips": (int,)}
 
 
@@ -42,6 +43,10 @@ def read_meta(meta: NDArray[Any] | None) -> dict[str, Any]:
     for name, kind in (("kind", str), ("stop_reason", str), ("converged", bool), ("history", list)):
         if name in value and not isinstance(value[name], kind):
             raise FileFormatError(f"{name} in meta is not of type {kind.__name__}")
+    for name in _COUNTS:
+        count = value.get(name, 0)
+        if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+            raise FileFormatError(f"{name} in meta is no number of vertices: {count!r:.40}")
     seconds = value.get("seconds", {})
     if not isinstance(seconds, dict) or not all(_is_number(x) for x in seconds.values()):
         raise FileFormatError("seconds in meta are not numbers by stage")

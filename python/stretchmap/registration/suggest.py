@@ -95,5 +95,5 @@ def _put_in(registration: Registration | LoadedMap) -> int:
     """Number of vertices of its mesh, the last ones, that the source as given had not."""
     if isinstance(registration, LoadedMap):
         counts = ("added_vertices", "boundary_splits")
-        return sum(int(registration.meta.get(name, 0)) for name in counts)
+        return sum(registration.meta.get(name, 0) for name in counts)
     return 0 if registration.refinement is None else registration.refinement.n_split

@@ -33,6 +33,7 @@ def packed(**arrays):
         "{", "[]", "3", '"text"', "[" * 100_000, '{"a": ' * 2000 + "1" + "}" * 2000,
         '{"a": NaN}', '{"seconds": 3}', '{"seconds": {"a": "b"}}', '{"seconds": {"a": true}}',
         '{"kind": ["map"]}', '{"converged": "yes"}', '{"stop_reason": {}}', '{"history": 3}',
+        '{"added_vertices": "3"}', '{"added_vertices": -1}', '{"boundary_splits": 1.5}',
         '{"history": [3]}', '{"history": [{}]}', '{"history": {"a": 1}}',
         json.dumps({"history": [RECORD | {"iteration": "one"}]}),
         json.dumps({"history": [RECORD | {"flips": 0.5}]}),
