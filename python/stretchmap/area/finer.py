@@ -432,7 +432,8 @@ def mapped_finer(
         )
         work.spend(len(records), n_faces)
         history += records
-        finer = replace(finer, angles=newton.angles, affordable=work.most_faces(STEPS_LEFT[-1]))
+        most_faces = work.most_faces(STEPS_LEFT[-1], last=True)
+        finer = replace(finer, angles=newton.angles, affordable=most_faces)
         measured = newton.measures()
         if with_rings and worth_rings(measured, asked.tol):
             work.spend_on_rings(n_faces)

@@ -149,7 +149,8 @@ def area_map(
     above follow. Where areas stay off, the edges that sag most in
     faces that are off are halved, three times at most, on surfaces of more than 40,000 faces, too.
     There become no more than 25 times as many faces with the usual ``time_limit``, in proportion
-    with another, and 2.5 times as many and 12,000 at any rate; but never more than a million. All
+    with another, and 2.5 times as many and 12,000 at any rate, the last few rounds aside; but never
+    more than a million. All
     steps together cost no more than even a slow machine has time for, so that the result does not
     depend on it; without ``refine`` no more than some seven hundred steps, more on a surface of
     less than 4,000 faces.

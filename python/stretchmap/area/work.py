@@ -13,8 +13,9 @@ from ..mesh.surfaces import TriMesh
 # the surface given, and no fewer than those.
 _EACH, _LEAST = 1200.0, 5e6
 # Where edges may be halved, so many for each second there is, no more than a slow processor gets
-# done; and a face for so many, where steps are left for them.
-_A_SECOND, _A_FACE = 4.5e5, 330.0
+# done; and a face for so many, where steps are left for them, or so many in the last rounds, where
+# few are added.
+_A_SECOND, _A_FACE, _A_LAST_FACE = 4.5e5, 330.0, 130.0
 _FLOPS = 2.1e4  # of an elimination, that take as long as one
 _TYPICAL = 100.0  # flops over the power 3/2 of the faces, as nested dissection has them
 MOST_FACES = 10**6  # of a surface with edges halved
@@ -119,10 +120,10 @@ class Work:
         units = min(max(left, least * cost), most * cost)
         return max(int(min(units, self._in_time()) / cost + 1e-9), 0)
 
-    def most_faces(self, steps: int) -> int:
+    def most_faces(self, steps: int, *, last: bool = False) -> int:
         """Those of the largest surface on which so many steps, one at least, can be afforded.
 
-        No more than there may be.
+        No more than there may be, which are more in the last rounds.
         """
         few, many = 0, 1
         while self.steps(many) >= steps:
@@ -130,7 +131,7 @@ class Work:
         while many - few > 1:
             middle = (few + many) // 2
             few, many = (middle, many) if self.steps(middle) >= steps else (few, middle)
-        return min(few, int(self._whole / _A_FACE), MOST_FACES)
+        return min(few, int(self._whole / (_A_LAST_FACE if last else _A_FACE)), MOST_FACES)
 
     def late(self) -> bool:
         """Whether what time is left is reserved, or for the certificate."""

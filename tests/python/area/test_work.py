@@ -150,6 +150,7 @@ def test_there_may_be_more_faces_and_steps_with_more_time() -> None:
     works = [Work.of(surface, Budget.of(limit, 16_000), refine=True) for limit in (4e-3, 2e-2)]
     few, many = (work.most_faces(1) / surface.n_faces for work in works)
     assert 4.6 < few < 5.2 and many == pytest.approx(5.0 * few, rel=1e-3)
+    assert works[0].most_faces(1, last=True) > works[0].most_faces(1)
     assert works[1].steps() == pytest.approx(5 * works[0].steps(), abs=5)
     unrefined = [Work.of(surface, Budget.of(limit, 16_000), refine=False) for limit in (4e-3, 2e-2)]
     assert unrefined[0].most == unrefined[1].most < works[1].steps()
