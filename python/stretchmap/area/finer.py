@@ -51,7 +51,8 @@ _PASSES = 14
 _TWINS = 2  # rounds in which the other long edges of needles follow: more cost more than they give
 _MORE = 3  # times as many faces that look inward as before: halving edges does not help
 _APPROACH = 30, 10, 10  # most steps towards areas, edges that sag too much halved after each
-_LOST = 0.5  # face SD from which on others lead no nearer
+# Face SD from which on others lead no nearer where these do not, and where nothing does.
+_HOPELESS, _LOST = 0.3, 0.5
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
@@ -287,6 +288,7 @@ class Finer:
         same = Pace()
         for most, after in zip(_APPROACH, STEPS_LEFT[1:], strict=True):
             newton, n_faces = finer.newton(), finer.level.surface.n_faces
+            before = newton.measures().face_std
             work.begin(newton, n_faces)
             affordable = work.steps(n_faces) - _LEAST_STEPS
             if affordable <= 0:
@@ -297,10 +299,13 @@ class Finer:
             work.spend_on_approach(len(records), n_faces)
             history += records
             finer = replace(finer, angles=newton.angles, affordable=work.most_faces(after))
-            if newton.measures().face_std > _LOST:
+            error = newton.measures().face_std
+            if error > _LOST:
                 break
             finer = finer.fitted_as_affordable()
             work.spend_on_fitting(finer.level.surface.n_faces)
+            if error > max(_HOPELESS, before):
+                break
             if finer.level.surface.n_faces > n_faces:
                 same = Pace()
         return finer, pace, history

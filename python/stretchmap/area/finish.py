@@ -44,6 +44,7 @@ _REST, _SLOW = 8, 0.01  # so many steps that lower the energy by less than this 
 _RATIO_GOAL = 10.0  # largest |ratio - 1| allowed, in units of tol
 _MARGIN = 0.8  # face SD, in units of tol, where the Newton steps end: the rings need some room
 _FAIR = 2.0  # face SD, in units of tol, up to which the shape budget counts and rings are tried
+_WORSE = 1.2  # times the least face SD so far: steps that end with more are undone
 _RING_WEIGHT = 1e4  # most weight of the area term in the projection of the rings
 
 # Where others follow that keep shapes more, steps beyond the first are better spent there.
@@ -217,7 +218,7 @@ def finish_areas(
     """Newton steps on the polyhedral areas: records, converged, reason; `pace` is moved on.
 
     Faces that look outward stay so; if some do not, that barrier is left out. None follows once
-    `late` says so.
+    `late` says so. Where slivers let the energy fall and the areas get worse, the best are kept.
     """
     start = time.perf_counter()
     history: list[IterationRecord] = []
@@ -229,7 +230,7 @@ def finish_areas(
     shape = _shape_weight(newton) if steps.balance == 1.0 else _SHAPE
     center = _Center(_CENTERED if steps.balance == 1.0 else 0.0)
     taken, error = None, math.inf
-    at_rest = _rest()
+    at_rest, best = _rest(), _Best()
     reason = _MOST_DONE
     for iteration in range(steps.max_iter + 1):
         if iteration:
@@ -243,6 +244,7 @@ def finish_areas(
         measured = newton.measures()
         error, pace.weight = measured.face_std, weight
         least = min(least, measured.angle_mean)
+        best.see(newton, measured)
         history.append(_record("newton", iteration, taken, measured, start))
         report(progress, "area", iteration, steps.max_iter, face_std=measured.face_std)
         if steps.balance == 1.0 and measured.face_std <= _MARGIN * tol and _within(measured, worst):
@@ -255,6 +257,9 @@ def finish_areas(
             break
     if steps.balance < 1.0:
         return history, reason == _AT_REST and history[-1].flips == 0, reason
+    if best.restored(newton, measured):
+        measured = newton.measures()
+        history.append(_record("newton", len(history), None, measured, start))
     last = _weights(min(weight, _RING_WEIGHT), barrier, shape)
     # Steps that are best for the faces, too, cost as much as three Newton steps each.
     fewest = 0 if pace.prolonged else _BEST_STEPS if _within(measured, _GOOD * tol) else 1
@@ -292,6 +297,30 @@ def _rest() -> Callable[[_core.area.NewtonStep], bool]:
         return stalled == _STALLED or slow == _REST
 
     return at_rest
+
+
+class _Best:
+    """The best areas of some steps, those with the fewest faces that do not look outward."""
+
+    def __init__(self) -> None:
+        self._key: tuple[float, float] = math.inf, math.inf
+        self._angles: NDArray[np.float64] | None = None
+
+    def see(self, newton: _core.area.SurfaceNewton, measured: _core.area.SurfaceMeasures) -> None:
+        """One more step, which may be better than all before."""
+        if (key := (measured.flips, measured.face_std)) < self._key:
+            self._key, self._angles = key, newton.angles
+
+    def restored(
+        self, newton: _core.area.SurfaceNewton, measured: _core.area.SurfaceMeasures
+    ) -> bool:
+        """Whether the last step was so much worse that the best is taken back."""
+        flips, face_std = self._key
+        as_good = flips == measured.flips and measured.face_std <= _WORSE * face_std
+        if as_good or self._angles is None:
+            return False
+        newton.angles = self._angles
+        return True
 
 
 @dataclass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -51,6 +52,48 @@ def test_steps_end_when_it_is_late() -> None:
     assert Work.of(surface, Budget(60.0), refine=True).late() is False
     equal = equal_areas(surface, sm.conformal_map(surface), None, Budget(0.0))
     assert len(equal.balanced(0.0)[1]) == 0
+
+
+class _Jumping:
+    """Newton steps the last of which makes areas worse, or turns faces inward."""
+
+    def __init__(self, newton: _core.area.SurfaceNewton, last: int, **measured: float) -> None:
+        self._newton, self._left, self._measured = newton, last, measured
+
+    def __getattr__(self, name: str):
+        return getattr(self._newton, name)
+
+    def step(self, weights: _core.area.SurfaceWeights):
+        self._left -= 1
+        return self._newton.step(weights)
+
+    def measures(self) -> SimpleNamespace:
+        names = ("flips", "ring_std", "face_std", "face_error", "angle_mean")
+        found = {name: getattr(self._newton.measures(), name) for name in names}
+        return SimpleNamespace(**(found | (self._measured if self._left == 0 else {})))
+
+    @property
+    def angles(self) -> np.ndarray:
+        return self._newton.angles
+
+    @angles.setter
+    def angles(self, angles: np.ndarray) -> None:
+        self._newton.angles, self._left = angles, -1
+
+
+@pytest.mark.parametrize(
+    ("worse", "kept"), [({"face_std": 0.9}, False), ({"flips": 3}, False), ({}, True)]
+)
+def test_a_last_step_that_makes_areas_worse_is_undone(worse: dict[str, float], kept: bool) -> None:
+    start = start_of(sm.samples.bumpy_torus(1000).surface)
+    newton, before = start.newton(), start.newton()
+    finish_areas(before, False, Steps(3, 1e-9, np.inf), None)
+    jumping = _Jumping(newton, 4, **worse)
+    records, converged, _ = finish_areas(jumping, False, Steps(4, 1e-9, np.inf), None)
+    assert (newton.angles == before.angles).all() == (not kept)
+    assert [record.iteration for record in records] == list(range(5 if kept else 6))
+    stds = [record.element_std for record in records]
+    assert stds[-1] == stds[4 if kept else 3] and records[-1].flips == 0 and not converged
 
 
 def test_what_is_reserved_goes_to_the_last_few_folds_only(monkeypatch) -> None:
