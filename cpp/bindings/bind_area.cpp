@@ -110,19 +110,11 @@ void bind_glide(py::module_& m) {
            }),
            py::kw_only(), py::arg("area") = 1.0, py::arg("shape") = 0.0, py::arg("chart") = 0.0,
            py::arg("facing") = 0.0, py::arg("epsilon") = 0.0);
-  py::class_<SurfacePatch>(m, "SurfacePatch")
-      .def(py::init([](const SurfaceNewton& newton, const std::vector<Index>& faces, int rings) {
-             return surface_patch(newton.problem(), faces, rings);
-           }),
-           py::arg("newton"), py::arg("faces"), py::arg("rings"), release_gil())
-      .def_readonly("problem", &SurfacePatch::problem)
-      .def_readonly("vertices", &SurfacePatch::vertices)
-      .def_readonly("held", &SurfacePatch::held)
-      .def_property_readonly(
-          "n_faces", [](const SurfacePatch& self) { return self.problem.chart.faces.rows(); });
   py::class_<SurfaceNewton>(m, "SurfaceNewton")
+      // No default for `held`: making an array of it would load NumPy with the module.
+      .def(py::init<GlideProblem, Points2>(), py::arg("problem"), py::arg("angles"), release_gil())
       .def(py::init<GlideProblem, Points2, Flags>(), py::arg("problem"), py::arg("angles"),
-           py::arg("held") = Flags(), release_gil())
+           py::arg("held"), release_gil())
       .def(
           "step",
           [](SurfaceNewton& self, const SurfaceWeights& weights) {
@@ -146,6 +138,16 @@ void bind_glide(py::module_& m) {
       .def_property_readonly("curvature", &SurfaceNewton::curvature)
       .def_property("angles", &SurfaceNewton::angles, &SurfaceNewton::move_to,
                     py::return_value_policy::copy);
+  py::class_<SurfacePatch>(m, "SurfacePatch")
+      .def(py::init([](const SurfaceNewton& newton, const std::vector<Index>& faces, int rings) {
+             return surface_patch(newton.problem(), faces, rings);
+           }),
+           py::arg("newton"), py::arg("faces"), py::arg("rings"), release_gil())
+      .def_readonly("problem", &SurfacePatch::problem)
+      .def_readonly("vertices", &SurfacePatch::vertices)
+      .def_readonly("held", &SurfacePatch::held)
+      .def_property_readonly(
+          "n_faces", [](const SurfacePatch& self) { return self.problem.chart.faces.rows(); });
 }
 
 }  // namespace
