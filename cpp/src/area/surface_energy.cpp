@@ -126,26 +126,6 @@ void add_shape(const Jet& d, const Jet& a, double weight, bool second, Jet& sum)
                  (2.0 * by_a / a.value) * a.gradient * a.gradient.transpose();
 }
 
-// How far the faces of an image look outward, where each does least.
-class Outward {
- public:
-  Outward(const GlideProblem& problem, const Points2Ref& angles)
-      : faces_(problem.chart.faces),
-        torus_(problem.torus()),
-        points_(torus_points(torus_, angles)) {}
-
-  double least(Index f) const {
-    TorusPoint p[3];
-    for (int k = 0; k < 3; ++k) p[k] = points_[faces_(f, k)];
-    return least_facing(p, torus_);
-  }
-
- private:
-  const Faces& faces_;
-  Torus torus_;
-  std::vector<TorusPoint> points_;
-};
-
 Jet face_energy(const GlideProblem& problem, const SurfaceWeights& weights, double scale,
                 const std::vector<TorusPoint>& points, const Points2Ref& angles, Index f,
                 bool second, double curvature) {
@@ -227,19 +207,16 @@ Points glide_image(const GlideProblem& problem, const Points2Ref& angles) {
   return image;
 }
 
-double least_facing(const GlideProblem& problem, const Points2Ref& angles) {
-  const Outward outward(problem, angles);
-  const double far = std::numeric_limits<double>::infinity();
-  return least_of(static_cast<Index>(problem.chart.faces.rows()), far,
-                  [&](Index f) { return outward.least(f) / problem.reference.areas(f); });
-}
-
-std::vector<Index> faces_inward(const GlideProblem& problem, const Points2Ref& angles) {
-  const Outward outward(problem, angles);
-  std::vector<Index> faces;
-  for (Index f = 0; f < static_cast<Index>(problem.chart.faces.rows()); ++f)
-    if (!(outward.least(f) > 0.0)) faces.push_back(f);
-  return faces;
+Vec least_facing(const GlideProblem& problem, const Points2Ref& angles) {
+  const std::vector<TorusPoint> points = torus_points(problem.torus(), angles);
+  const Torus torus = problem.torus();
+  Vec least(problem.chart.faces.rows());
+  for_rows(static_cast<Index>(least.size()), kElementChunk, [&](Index f) {
+    TorusPoint p[3];
+    for (int k = 0; k < 3; ++k) p[k] = points[problem.chart.faces(f, k)];
+    least(f) = least_facing(p, torus) / problem.reference.areas(f);
+  });
+  return least;
 }
 
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles) {

@@ -173,6 +173,20 @@ bool SurfaceNewton::project_rings(const SurfaceWeights& weights, double face_std
   return false;
 }
 
+double SurfaceNewton::facing() const {
+  const Vec each = least_facing(problem_, angles_);
+  return least_of(static_cast<Index>(each.size()), std::numeric_limits<double>::infinity(),
+                  [&](Index f) { return each(f); });
+}
+
+std::vector<Index> SurfaceNewton::inward() const {
+  const Vec each = least_facing(problem_, angles_);
+  std::vector<Index> faces;
+  for (Index f = 0; f < each.size(); ++f)
+    if (!(each(f) > 0.0)) faces.push_back(f);
+  return faces;
+}
+
 SurfaceMeasures SurfaceNewton::measures() const {
   Vec areas = glide_areas(problem_, angles_);
   const double total = areas.sum();

@@ -53,8 +53,11 @@ SurfacePatch surface_patch(const GlideProblem& problem, const std::vector<Index>
   }
   part.n_vertices = static_cast<Index>(vertices.size());
   patch.vertices = Eigen::Map<const IndexVec>(vertices.data(), part.n_vertices);
-  patch.held.resize(part.n_vertices);
-  for (Index i = 0; i < part.n_vertices; ++i) patch.held(i) = !free(patch.vertices(i));
+  patch.held = Flags::Zero(part.n_vertices);
+  for (Index f = 0; f < m; ++f)
+    if (!inside(f))
+      for (int k = 0; k < 3; ++k)
+        if (const Index i = row(chart.faces(f, k)); i >= 0) patch.held(i) = 1;
   return patch;
 }
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import stretchmap as sm
 from small_handles import eased, small_handle, start_of
 from stretchmap import _core
-from stretchmap.area import patches
-from stretchmap.area.finer import Finer
-from stretchmap.area.finish import Pace, approach_areas, unfold_faces
+from stretchmap.area import finer, patches
+from stretchmap.area.finer import Finer, mapped_finer
+from stretchmap.area.finish import Pace, Steps, approach_areas, unfold_faces
 from stretchmap.area.patches import turn_in_patches
+from stretchmap.area.route import Made
 from stretchmap.area.work import Work
 
 
@@ -28,16 +31,26 @@ def approached(seed: int) -> tuple[Finer, _core.area.SurfaceNewton, Pace]:
 def test_a_patch_is_what_lies_round_faces() -> None:
     start = start_of(sm.samples.torus_surface(30, 20))
     faces = start.level.surface.F
-    n_free = 3
+    inside = set(faces[7])
     for rings in (1, 2, 3):
         patch = _core.area.SurfacePatch(start.newton(), [7], rings)
-        # Two rings of vertices more with each ring of faces.
-        near = np.isin(faces, patch.vertices[patch.held == 0]).any(axis=1)
-        assert (patch.held == 0).sum() >= n_free and patch.n_faces == near.sum()
-        assert set(patch.vertices) == set(faces[near].ravel())
-        outside = np.unique(faces[~near])
-        assert set(patch.vertices[patch.held == 1]) == set(patch.vertices) & set(outside)
-        n_free = len(patch.vertices)
+        near = np.isin(faces, list(inside)).any(axis=1)
+        assert patch.n_faces == near.sum() and set(patch.vertices) == set(faces[near].ravel())
+        assert inside <= set(patch.vertices[patch.held == 0])
+        assert set(patch.vertices[patch.held == 1]) == set(patch.vertices) & set(faces[~near].flat)
+        inside = set(patch.vertices)
+
+
+def test_what_a_patch_encloses_is_free() -> None:
+    """A vertex with all its faces in the patch, none of which is given."""
+    start = start_of(sm.samples.torus_surface(30, 20))
+    faces = start.level.surface.F
+    vertex = 100
+    link = np.setdiff1d(faces[(faces == vertex).any(axis=1)], vertex)
+    around = np.isin(faces, link).sum(axis=1) == 2
+    seeds = np.flatnonzero(around & ~(faces == vertex).any(axis=1))
+    patch = _core.area.SurfacePatch(start.newton(), seeds, 1)
+    assert patch.held[patch.vertices == vertex] == [0] and patch.held.any()
 
 
 def test_a_patch_of_everything_takes_the_same_steps() -> None:
@@ -86,6 +99,25 @@ def test_the_last_few_faces_are_turned_in_patches(monkeypatch) -> None:
         in_patches.append(newton.measures().face_std)
         on_the_whole.append(whole.measures().face_std)
     assert np.mean(in_patches) < 0.7 * np.mean(on_the_whole)
+
+
+def test_what_patches_turn_takes_no_steps_on_the_whole(monkeypatch) -> None:
+    start, newton, pace = approached(1)
+    near = dataclasses.replace(start, angles=newton.angles)
+    assert near.added.n_split > 0
+    monkeypatch.setattr(Finer, "approached", lambda self, *_: (self, pace, []))
+    monkeypatch.setattr(patches, "_WHOLE", 1.0)
+
+    def on_the_whole(*_: object) -> None:
+        raise AssertionError("patches serve here")
+
+    monkeypatch.setattr(finer, "unfold_faces", on_the_whole)
+    work = Work(near.level.surface.n_faces, 1e9, 40)
+    made = Made(near.angles, 0.0, near.ratio, [])
+    found = mapped_finer(near, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work)
+    assert found is not None and found[1].newton().least_facing() > 0.0
+    records = [record for record in found[0].history if record.stage == "untangle"]
+    assert records and all(np.isnan(record.element_std) for record in records)
 
 
 def test_patches_as_large_as_the_surface_are_left_alone(monkeypatch) -> None:

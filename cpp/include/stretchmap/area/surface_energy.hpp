@@ -17,8 +17,6 @@
 // back. Areas of source and torus are scaled to one.
 #pragma once
 
-#include <vector>
-
 #include "stretchmap/area/chart.hpp"
 #include "stretchmap/area/surface_reference.hpp"
 #include "stretchmap/base/torus.hpp"
@@ -69,12 +67,9 @@ double best_scale(const GlideProblem& problem, const Points2Ref& angles);
 // \return (n, 3) points of the torus of area one.
 Points glide_image(const GlideProblem& problem, const Points2Ref& angles);
 
-// \return least of the faces' least component of the area vector along the torus' normal over the
-//         source area: positive where the certificate's condition holds on every face.
-double least_facing(const GlideProblem& problem, const Points2Ref& angles);
-
-// \return the faces where that component is not positive.
-std::vector<Index> faces_inward(const GlideProblem& problem, const Points2Ref& angles);
+// \return (m) least component of each face's area vector along the torus' normal, over its source
+//         area: positive where the certificate's condition holds.
+Vec least_facing(const GlideProblem& problem, const Points2Ref& angles);
 
 // \return (m) areas of the polyhedral image; the torus itself has area one.
 Vec glide_areas(const GlideProblem& problem, const Points2Ref& angles);

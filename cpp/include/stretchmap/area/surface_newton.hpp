@@ -38,10 +38,10 @@ class SurfaceNewton {
   // \return of the polyhedral image; flips are the faces that break the certificate's condition.
   SurfaceMeasures measures() const;
 
-  // As least_facing.
-  double facing() const { return least_facing(problem_, angles_); }
-  // \return the faces that do not look outward.
-  std::vector<Index> inward() const { return faces_inward(problem_, angles_); }
+  // The least of least_facing.
+  double facing() const;
+  // \return the faces where that is not positive.
+  std::vector<Index> inward() const;
 
   // Of the elimination in a step that needs one.
   double flops();
