@@ -112,12 +112,20 @@ def test_what_patches_turn_takes_no_steps_on_the_whole(monkeypatch) -> None:
         raise AssertionError("patches serve here")
 
     monkeypatch.setattr(finer, "unfold_faces", on_the_whole)
+    most_faces, asked = Work.most_faces, []
+
+    def counted(self: Work, steps: int, *, last: bool = False) -> int:
+        asked.append(last)
+        return most_faces(self, steps, last=last)
+
+    monkeypatch.setattr(Work, "most_faces", counted)
     work = Work(near.level.surface.n_faces, 1e9, 40)
     made = Made(near.angles, 0.0, near.ratio, [])
     found = mapped_finer(near, made, Steps(5, 5e-3, 1.2), 0.01, False, None, work)
     assert found is not None and found[1].newton().least_facing() > 0.0
     records = [record for record in found[0].history if record.stage == "untangle"]
     assert records and all(np.isnan(record.element_std) for record in records)
+    assert asked and all(asked)  # rounds add few faces, and there may be more of them
 
 
 def test_patches_as_large_as_the_surface_are_left_alone(monkeypatch) -> None:

@@ -15,7 +15,7 @@ from stretchmap import TriMesh, _core
 from stretchmap.area import finest, finish
 from stretchmap.area.coarse import Level
 from stretchmap.area.finer import Finer, goal
-from stretchmap.area.finish import approach_areas, unfold_faces
+from stretchmap.area.finish import Pace, approach_areas, unfold_faces
 from stretchmap.area.route import Made
 from stretchmap.area.work import Work
 from stretchmap.base.torus import TWO_PI
@@ -261,8 +261,32 @@ def test_steps_towards_areas_go_on_while_these_get_better(monkeypatch) -> None:
     assert len(records) == 2
     # Steps that follow on the same surface go on at that pace, and do no harm.
     before, weight = newton.measures().face_std, pace.weight
+    afresh, _ = approach_areas(start.level.newton(newton.angles, start.ratio), 1, None)
     follow, faster = approach_areas(newton, 2, None, None, pace)
     assert pace.weight == weight <= faster.weight and follow[-1].element_std < before
+    assert follow[0].energy < 0.5 * afresh[0].energy  # shapes weigh less by then
+
+
+@pytest.mark.parametrize(("steps", "times"), [(4, 1), (0, 3)])
+def test_approaches_that_lead_away_end(steps: int, times: int, monkeypatch) -> None:
+    start = Finer.wrapped(*eased(small_handle(0, 3.4))).fitted(3.0)
+    assert start is not None
+    newton, middle = start.newton(), start.newton()
+    approach_areas(newton, steps, None)
+    approach_areas(middle, 2, None)
+    assert 0.3 < middle.measures().face_std < 0.5
+    taken = []
+
+    def to_the_middle(newton: _core.area.SurfaceNewton, *_: object) -> tuple[list, Pace]:
+        taken.append(newton)
+        if len(taken) == 1:
+            newton.angles = middle.angles
+        return [], Pace()
+
+    monkeypatch.setattr("stretchmap.area.finer.approach_areas", to_the_middle)
+    near = dataclasses.replace(start, angles=newton.angles)
+    found, _, _ = near.approached(None, Work(1, 1e12, 40))
+    assert len(taken) == times and found.level.surface.n_faces > start.level.surface.n_faces
 
 
 def test_edges_may_sag_more_where_faces_are_few() -> None:
