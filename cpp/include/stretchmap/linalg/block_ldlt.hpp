@@ -13,6 +13,8 @@
 
 namespace stretchmap::linalg {
 
+struct Dissection;
+
 // K unknowns per block row, 1 to 3. The symbolic analysis belongs to the pattern and is done once.
 template <int K>
 class BlockLdlt {
@@ -39,7 +41,8 @@ class BlockLdlt {
   Vec solve(const VecRef& right) const;
 
  private:
-  // A separator of the nested dissection, or a piece too small to be divided, and what it leaves.
+  // A separator of the nested dissection, or a piece too small to be divided, or what one of least
+  // degree leads to; and what it leaves.
   struct Front {
     Index first = 0, last = 0;    // its block rows, by their places in the elimination order
     std::vector<Index> children;  // fronts eliminated before
@@ -53,6 +56,8 @@ class BlockLdlt {
   using Leftover = std::unique_ptr<double[]>;  // what an eliminated front adds to later ones
   using Panel = Eigen::Map<const Eigen::MatrixXd>;
 
+  // Fronts and their borders, in that order.
+  void plan(const SparseMatrix& A, Dissection found);
   void find_borders(const SparseMatrix& A);
   void group_fronts();
   void eliminate(const SparseMatrix& A, Index front, std::vector<Leftover>& leftovers);

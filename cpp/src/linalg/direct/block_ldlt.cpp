@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "linalg/direct/dense_front.hpp"
+#include "linalg/direct/minimum_degree.hpp"
 #include "linalg/direct/nested_dissection.hpp"
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/parallel.hpp"
@@ -15,6 +16,9 @@ namespace {
 constexpr Index kTrees = 32;    // subtrees at least that threads work on, if there are so many
 constexpr Index kColumns = 16;  // block columns of a front that one thread fills
 constexpr Index kRows = 128;    // rows of a front that one thread multiplies
+// Flops from which on another order is worth a look, and of how many it saves it is taken: its
+// trees are less even, and leave less for threads to share.
+constexpr double kCheap = 1e6, kFewer = 0.8;
 
 // Block columns of block row i, in the matrix's own numbering.
 template <int K>
@@ -28,22 +32,37 @@ struct BlockRow {
   const Index* columns;
 };
 
+// The blocks' pattern.
 template <int K>
-Dissection dissect_blocks(const SparseMatrix& A, Index n) {
-  std::vector<Index> start{0}, col;
-  for (Index i = 0; i < n; ++i) {
-    const BlockRow<K> row(A, i);
-    for (Index e = 0; e < row.size; ++e) col.push_back(row.column(e));
-    start.push_back(static_cast<Index>(col.size()));
+struct BlockGraph {
+  BlockGraph(const SparseMatrix& A, Index n) {
+    for (Index i = 0; i < n; ++i) {
+      const BlockRow<K> row(A, i);
+      for (Index e = 0; e < row.size; ++e) col.push_back(row.column(e));
+      start.push_back(static_cast<Index>(col.size()));
+    }
   }
-  return dissect(n, start.data(), col.data());
-}
+  std::vector<Index> start{0}, col;
+};
 
 }  // namespace
 
 template <int K>
 BlockLdlt<K>::BlockLdlt(const SparseMatrix& A) : n_(static_cast<Index>(A.rows()) / K) {
-  Dissection found = dissect_blocks<K>(A, n_);
+  const BlockGraph<K> graph(A, n_);
+  const Index *start = graph.start.data(), *col = graph.col.data();
+  plan(A, dissect(n_, start, col));
+  if (const double dissected = flops(); dissected > kCheap) {
+    MinimumDegree other = minimum_degree(n_, start, col, K);
+    if (other.flops < kFewer * dissected) plan(A, std::move(other.tree));
+  }
+  group_fronts();
+}
+
+template <int K>
+void BlockLdlt<K>::plan(const SparseMatrix& A, Dissection found) {
+  fronts_.clear();
+  total_ = 0;
   order_ = std::move(found.order);
   place_.resize(order_.size());
   for (Index k = 0; k < n_; ++k) place_[order_[k]] = k;
@@ -54,7 +73,6 @@ BlockLdlt<K>::BlockLdlt(const SparseMatrix& A) : n_(static_cast<Index>(A.rows())
     fronts_.back().children = std::move(node.children);
   }
   find_borders(A);
-  group_fronts();
 }
 
 template <int K>
@@ -81,11 +99,7 @@ void BlockLdlt<K>::find_borders(const SparseMatrix& A) {
 template <int K>
 double BlockLdlt<K>::flops() const {
   double sum = 0.0;
-  for (const Front& front : fronts_)
-    for (Index k = 0; k < K * front.own(); ++k) {
-      const double below = static_cast<double>(K * front.size() - k - 1);
-      sum += below * (below + 1.0);
-    }
+  for (const Front& front : fronts_) sum += front_flops(K * front.size(), K * front.own());
   return sum;
 }
 
