@@ -87,7 +87,8 @@ std::vector<Group> grouped(const std::vector<Index>& order, const Elimination& f
   std::vector<Index> group_of(order.size());
   Index last = -1;
   for (const Index k : postorder(found.parent)) {
-    const bool same = last >= 0 && found.parent[last] == k && found.count[last] == found.count[k] + 1;
+    const bool same =
+        last >= 0 && found.parent[last] == k && found.count[last] == found.count[k] + 1;
     if (!same) groups.emplace_back();
     groups.back().vertices.push_back(order[k]);
     groups.back().border = found.count[k];
