@@ -22,66 +22,56 @@ constexpr Index kBlock = 32;           // columns of a panel eliminated one by o
 
 Index tiles(Index n, Index size) { return (n + size - 1) / size; }
 
-// target(i, j) -= sum over k of a[k][i] b[k][j], i < tall, j < wide; its columns `stride` apart.
-// Left to itself GCC loads what a column is multiplied with as a vector and permutes that, at half
-// the speed; and vectors longer than the registers pass through memory, at a fifth of it.
-template <class Vector>
-STRETCHMAP_INLINE void subtract(const double* a, const double* b, Index depth, double* target,
-                                std::ptrdiff_t stride, Index tall, Index wide) {
-  constexpr Index kLanes = sizeof(Vector) / sizeof(double), kVectors = kTall / kLanes;
-  const double zeros[kLanes] = {};
-  Vector sum[kWide][kVectors];
-  for (Index j = 0; j < kWide; ++j)
-    for (Index v = 0; v < kVectors; ++v) std::memcpy(&sum[j][v], zeros, sizeof(Vector));
-  for (Index k = 0; k < depth; ++k, a += kTall, b += kWide) {
-    Vector left[kVectors];
-    for (Index v = 0; v < kVectors; ++v) std::memcpy(&left[v], a + v * kLanes, sizeof(Vector));
-    for (Index j = 0; j < kWide; ++j)
-      for (Index v = 0; v < kVectors; ++v) sum[j][v] += left[v] * b[j];
+// target(i, j) -= sum over k of a[k][i] b[k][j], i < kTall, j < kWide; its columns `stride` apart.
+// One text for several kinds of processors: of a function that is only inlined into those for one
+// kind, GCC has by then split up the vectors that all others would have to.
+#define STRETCHMAP_SUBTRACT_TILE(attributes, Vector)                                              \
+  attributes void subtract_tile(const double* a, const double* b, Index depth, double* target,    \
+                                std::ptrdiff_t stride) {                                          \
+    constexpr Index kLanes = sizeof(Vector) / sizeof(double), kVectors = kTall / kLanes;          \
+    const double zeros[kLanes] = {};                                                              \
+    Vector sum[kWide][kVectors];                                                                  \
+    for (Index j = 0; j < kWide; ++j)                                                             \
+      for (Index v = 0; v < kVectors; ++v) std::memcpy(&sum[j][v], zeros, sizeof(Vector));        \
+    for (Index k = 0; k < depth; ++k, a += kTall, b += kWide) {                                   \
+      Vector left[kVectors];                                                                      \
+      for (Index v = 0; v < kVectors; ++v) std::memcpy(&left[v], a + v * kLanes, sizeof(Vector)); \
+      for (Index j = 0; j < kWide; ++j)                                                           \
+        for (Index v = 0; v < kVectors; ++v) sum[j][v] += left[v] * b[j];                         \
+    }                                                                                             \
+    for (Index j = 0; j < kWide; ++j)                                                             \
+      for (Index v = 0; v < kVectors; ++v) {                                                      \
+        Vector part;                                                                              \
+        std::memcpy(&part, target + j * stride + v * kLanes, sizeof(Vector));                     \
+        part -= sum[j][v];                                                                        \
+        std::memcpy(target + j * stride + v * kLanes, &part, sizeof(Vector));                     \
+      }                                                                                           \
   }
-  if (tall == kTall && wide == kWide) {
-    for (Index j = 0; j < kWide; ++j)
-      for (Index v = 0; v < kVectors; ++v) {
-        Vector part;
-        std::memcpy(&part, target + j * stride + v * kLanes, sizeof(Vector));
-        part -= sum[j][v];
-        std::memcpy(target + j * stride + v * kLanes, &part, sizeof(Vector));
-      }
-    return;
-  }
-  double tile[kWide * kTall];
-  for (Index j = 0; j < kWide; ++j)
-    for (Index v = 0; v < kVectors; ++v)
-      std::memcpy(tile + j * kTall + v * kLanes, &sum[j][v], sizeof(Vector));
-  for (Index j = 0; j < wide; ++j)
-    for (Index i = 0; i < tall; ++i) target[j * stride + i] -= tile[kTall * j + i];
-}
 
-template <Index Lanes>
-struct Lane {
 #if defined(__GNUC__)
-  using Vector = double __attribute__((vector_size(Lanes * sizeof(double))));
+using Two = double __attribute__((vector_size(16)));
 #else
-  using Vector = Eigen::Array<double, Lanes, 1>;
+using Two = Eigen::Array2d;
 #endif
-};
 
 #ifdef STRETCHMAP_CLONES_CHOSEN
-#define STRETCHMAP_SUBTRACT_TILE(processor, lanes)                                          \
-  __attribute__((target(processor))) void subtract_tile(                                    \
-      const double* a, const double* b, Index depth, double* target, std::ptrdiff_t stride, \
-      Index tall, Index wide) {                                                             \
-    subtract<Lane<lanes>::Vector>(a, b, depth, target, stride, tall, wide);                 \
-  }
-STRETCHMAP_SUBTRACT_TILE("default", 2)
-STRETCHMAP_SUBTRACT_TILE("arch=x86-64-v3", 4)
-STRETCHMAP_SUBTRACT_TILE("arch=x86-64-v4", 8)
+using Four = double __attribute__((vector_size(32)));
+using Eight = double __attribute__((vector_size(64)));
+STRETCHMAP_SUBTRACT_TILE(__attribute__((target("default"))), Two)
+STRETCHMAP_SUBTRACT_TILE(__attribute__((target("arch=x86-64-v3"))), Four)
+STRETCHMAP_SUBTRACT_TILE(__attribute__((target("arch=x86-64-v4"))), Eight)
 #else
-void subtract_tile(const double* a, const double* b, Index depth, double* target,
-                   std::ptrdiff_t stride, Index tall, Index wide) {
-  subtract<Lane<2>::Vector>(a, b, depth, target, stride, tall, wide);
-}
+STRETCHMAP_SUBTRACT_TILE(, Two)
 #endif
+
+// The same of a part of a tile.
+void subtract_part(const double* a, const double* b, Index depth, double* target,
+                   std::ptrdiff_t stride, Index tall, Index wide) {
+  double tile[kWide * kTall] = {};
+  subtract_tile(a, b, depth, tile, kTall);
+  for (Index j = 0; j < wide; ++j)
+    for (Index i = 0; i < tall; ++i) target[j * stride + i] += tile[kTall * j + i];
+}
 
 // The columns right of `c` up to `end`, and the rows from there on up to `end`, less the outer
 // product.
@@ -152,11 +142,15 @@ void update(const Target& target, const double* panel, std::ptrdiff_t rows, Inde
         for (Index t = 0; t < height; t += kTall) {
           const Index row = top + t, column = s * kWide;
           if (row + kTall <= column) continue;
-          subtract_tile(left.data() + static_cast<std::ptrdiff_t>(t) * deep,
-                        right.data() + static_cast<std::ptrdiff_t>(column) * deep, deep,
-                        target.data + column * target.stride + row, target.stride,
-                        std::min(kTall, target.rows - row),
-                        std::min(kWide, target.columns - column));
+          const double* a = left.data() + static_cast<std::ptrdiff_t>(t) * deep;
+          const double* b = right.data() + static_cast<std::ptrdiff_t>(column) * deep;
+          double* to = target.data + column * target.stride + row;
+          const Index tall = std::min(kTall, target.rows - row);
+          const Index wide = std::min(kWide, target.columns - column);
+          if (tall == kTall && wide == kWide)
+            subtract_tile(a, b, deep, to, target.stride);
+          else
+            subtract_part(a, b, deep, to, target.stride, tall, wide);
         }
     });
   }
