@@ -10,7 +10,8 @@
 namespace stretchmap::linalg {
 
 struct SpdOptions {
-  // "direct"     L D L' by dense fronts, nested dissection: surfaces, small solids.
+  // "direct"     L D L' by dense fronts, nested dissection or least degree: surfaces, small
+  //              solids.
   // "multigrid"  conjugate gradients with smoothed aggregation: solids; cost linear in the mesh.
   // "jacobi"     conjugate gradients with the diagonal: cheapest setup, for checks.
   // "cholmod"    supernodal sparse Cholesky of SuiteSparse, in builds that have it.
