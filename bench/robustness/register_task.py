@@ -20,7 +20,8 @@ def map_registration(source: sm.TetMesh, job: dict[str, Any]) -> tuple[Any, dict
     marks = None
     if job["guide"]:
         marks = landmarks_between(sm.load_map(job["guide"]), job["landmarks"])
-    result = sm.register(source, target, marks, keep_best=True)
+    options = sm.FillOptions(time_limit=job["per_element"])
+    result = sm.register(source, target, marks, keep_best=True, options=options)
     found = figures.of_solid_map(source, result)
     return result, found | {
         "landmarks": len(result.landmarks),
