@@ -187,21 +187,24 @@ def approach_areas(
     start = time.perf_counter()
     history: list[IterationRecord] = []
     pace = Pace() if pace is None else replace(pace)
-    shape, at_rest, lowest = _shape_weight(newton), _rest(), [newton.measures().face_std]
-    while len(history) < most and newton.measures().face_std > _NEAR:
+    shape, at_rest, error = _shape_weight(newton), _rest(), newton.measures().face_std
+    lowest = [error]
+    while len(history) < most and error > _NEAR:
         if late is not None and late():
             break
         if len(history) >= _SURE and (
-            newton.measures().face_std <= _FAR
+            error <= _FAR
             or (len(history) % _LOOK == 0 and lowest[-1] > _FALLS * lowest[-1 - _LOOK])
         ):
             break
         taken = newton.step(_weights(pace.weight, 0.0, shape))
         if taken.step >= _FULL_STEP:
             pace.weight = min(pace.weight * _GROWTH, _LIGHT)
-        history.append(_record("approach", len(history) + 1, taken, newton.measures(), start))
-        report(progress, "area", len(history), most, face_std=history[-1].element_std)
-        lowest.append(min(lowest[-1], history[-1].element_std))
+        measured = newton.measures()
+        error = measured.face_std
+        history.append(_record("approach", len(history) + 1, taken, measured, start))
+        report(progress, "area", len(history), most, face_std=error)
+        lowest.append(min(lowest[-1], error))
         if at_rest(taken):
             break
     return history, pace
