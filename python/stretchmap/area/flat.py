@@ -53,17 +53,23 @@ def unfolded_turns(surface: TriMesh, conformal: ConformalMap) -> NDArray[np.floa
             )
         return turns
 
-    turns = spread(drawn=False)
-    if len(lost(turns)):
-        weighted = _weighted_turns(surface, chart, forms)
-        turns = spread(drawn=True) if weighted is None else weighted
-    if len(out := lost(turns)):
-        raise SolverError(
-            f"{describe('face', out)} lie so far out on a long, thin limb that a flat map "
-            "shrinks them to nothing: cut the limb short or remesh it coarser",
-            out,
-        )
-    return turns
+    tried = [embedded, spread(drawn=False)]
+    if not len(lost(tried[-1])):
+        return tried[-1]
+    weighted = _weighted_turns(surface, chart, forms)
+    if weighted is not None:
+        return weighted
+    tried.append(spread(drawn=True))
+    # Where none has room to spare, what is not folded, if only just, will do.
+    best = max(tried, key=lambda turns: _core.area.turn_areas(chart, turns).min())
+    if _core.area.turn_areas(chart, best).min() > 0.0:
+        return best
+    out = lost(tried[-1])
+    raise SolverError(
+        f"{describe('face', out)} lie so far out on a long, thin limb that a flat map "
+        "shrinks them to nothing: cut the limb short or remesh it coarser",
+        out,
+    )
 
 
 def _weighted_turns(

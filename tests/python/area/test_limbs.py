@@ -12,7 +12,7 @@ import pytest
 import stretchmap as sm
 from shapes import with_branch, with_limb
 from stretchmap import _core
-from stretchmap.area import finish, limbs
+from stretchmap.area import finish, flat, limbs
 from stretchmap.area.flat import unfolded_turns
 from stretchmap.area.limbs import spread_limbs
 from stretchmap.errors import CertificationError, SolverError
@@ -94,6 +94,18 @@ def test_folds_are_mended_by_neighbors_and_all_else_stays():
     assert (disk.areas(mended) > 0.0).all()
     assert np.array_equal(mended[rim], z[rim])
     assert np.array_equal(limbs._unfolded(disk, z, rim), z)
+
+
+def test_faces_with_hardly_any_room_are_no_reason_to_refuse(monkeypatch):
+    surface = limb(40)
+    conformal = sm.conformal_map(surface)
+    chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
+    noise = 0.05 * np.random.default_rng(1).normal(size=conformal.turns.shape)
+    folded = dataclasses.replace(conformal, turns=conformal.turns + noise)
+    least = _core.area.turn_areas(chart, unfolded_turns(surface, folded)).min()
+    monkeypatch.setattr(flat, "_LEAST_AREA", 1.01 * least)
+    monkeypatch.setattr(flat, "_weighted_turns", lambda *given: None)
+    assert (_core.area.turn_areas(chart, unfolded_turns(surface, folded)) > 0.0).all()
 
 
 def test_a_limb_beyond_the_reach_of_numbers_is_refused_with_the_remedy():
