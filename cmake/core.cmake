@@ -3,9 +3,8 @@ file(GLOB_RECURSE core_sources CONFIGURE_DEPENDS cpp/src/*.cpp)
 find_package(Threads REQUIRED)
 set(parts stretchmap_core stretchmap_wide)
 # Kernels for wider processors, chosen at run time. No contraction, so that all of them give the
-# same bits, but in dense factors, to which it is worth a third of the time. And a part by itself:
-# with a precompiled header, or in one unit with what may contract, GCC forgets the options for
-# functions of a target of their own.
+# same bits; and a part by itself: with a precompiled header, or in one unit with what may contract,
+# GCC forgets the options for functions of a target of their own.
 set(wide cpp/src/volume/tet_weights.cpp cpp/src/volume/tet_weights_avx2.cpp
          cpp/src/volume/tet_weights_avx512.cpp cpp/src/volume/element_energy.cpp
          cpp/src/volume/line_bound.cpp cpp/src/linalg/multigrid/block_products.cpp
@@ -63,8 +62,6 @@ endforeach()
 
 if(NOT MSVC)
   target_compile_options(stretchmap_wide PRIVATE -ffp-contract=off)
-  set_source_files_properties(cpp/src/linalg/direct/dense_front.cpp PROPERTIES COMPILE_OPTIONS
-                                                                               -ffp-contract=fast)
   if(x86)
     set_source_files_properties(cpp/src/volume/tet_weights_avx2.cpp PROPERTIES COMPILE_OPTIONS -mavx2)
     set_source_files_properties(cpp/src/volume/tet_weights_avx512.cpp PROPERTIES COMPILE_OPTIONS

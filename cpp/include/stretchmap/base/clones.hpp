@@ -1,7 +1,6 @@
 // STRETCHMAP_CLONES before a function compiles it for several generations of processors; the one
 // to run is chosen when the library is loaded. Loops over lanes in it are vectorized accordingly.
-// Its file has to be compiled without contraction, so that all of them give the same bits, or the
-// newer ones do, which have a fused multiply-add, and the oldest others.
+// Its file has to be compiled without contraction, so that all of them give the same bits.
 #pragma once
 
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
