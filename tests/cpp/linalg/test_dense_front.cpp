@@ -32,4 +32,11 @@ TEST_CASE("fronts that fill tiles, and fronts that do not, are eliminated") {
   }
 }
 
+TEST_CASE("an elimination's work is that of its steps") {
+  double sum = 0.0;
+  for (Index k = 0; k < 4; ++k) sum += (10.0 - k - 1.0) * (10.0 - k);
+  CHECK(linalg::front_flops(10.0, 4.0) == doctest::Approx(sum));
+  CHECK(linalg::front_flops(0.0, 0.0) == 0.0);
+}
+
 TEST_SUITE_END();

@@ -179,6 +179,12 @@ Index eliminate_front(double* panel, double* schur, Index rows, Index own) {
   return -1;
 }
 
+// A step of an elimination with n unknowns left below takes n (n + 1).
+double front_flops(double rows, double own) {
+  const auto all = [](double n) { return (n - 1.0) * n * (n + 1.0) / 3.0; };
+  return all(rows) - all(rows - own);
+}
+
 Rows normal_matrix(const RowsRef& A, const VecRef& weights) {
   const Index n = static_cast<Index>(A.cols());
   Rows product = Rows::Zero(n, n);

@@ -12,4 +12,7 @@ namespace stretchmap::linalg {
 // \return the first column whose pivot is zero or not finite, -1 if there is none.
 Index eliminate_front(double* panel, double* schur, Index rows, Index own);
 
+// Multiplications and additions of that.
+double front_flops(double rows, double own);
+
 }  // namespace stretchmap::linalg

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "linalg/direct/dense_front.hpp"
+
 namespace stretchmap::linalg {
 
 namespace {
@@ -125,11 +127,6 @@ void merge(std::vector<Group>& groups, Index width) {
 }
 
 }  // namespace
-
-double front_flops(double size, double own) {
-  const auto below = [](double n) { return (n - 1.0) * n * (n + 1.0) / 3.0; };
-  return below(size) - below(size - own);
-}
 
 MinimumDegree minimum_degree(Index n, const Index* start, const Index* col, Index width) {
   MinimumDegree result;

@@ -16,7 +16,4 @@ struct MinimumDegree {
 // \param width unknowns per vertex.
 MinimumDegree minimum_degree(Index n, const Index* start, const Index* col, Index width);
 
-// Multiplications and additions that eliminate the first `own` of `size` unknowns, all coupled.
-double front_flops(double size, double own);
-
 }  // namespace stretchmap::linalg
