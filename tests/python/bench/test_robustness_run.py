@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stretchmap import TetMesh, samples, write
+from stretchmap import FillOptions, TetMesh, samples, write
 
 ROOM = Path(__file__).resolve().parents[3] / "bench" / "robustness"
 for package in ("manifold3d", "pyacvd", "pytetwild", "rich"):
@@ -78,6 +78,24 @@ def test_registrations_with_landmarks_are_guided_by_those_without(tmp_path, monk
     assert plain["certified"] and plain["landmarks"] == 0
     assert marked["certified"] and marked["landmarks"] == registrations.LANDMARKS
     assert marked["landmark_error"] < 1e-6
+
+
+def test_registrations_are_told_their_limit(monkeypatch) -> None:
+    import register_task
+    import task
+
+    class Told(Exception):
+        pass
+
+    def register(*given: Any, options: FillOptions, **more: Any) -> None:
+        raise Told(options.time_limit)
+
+    monkeypatch.setattr(register_task.sm, "register", register)
+    monkeypatch.setattr(task, "load", lambda path: None)
+    with pytest.raises(Told, match=r"^0\.25$"):
+        register_task.map_registration(
+            samples.ball(), {"target": "", "guide": "", "per_element": 0.25}
+        )
 
 
 def test_who_exceeds_the_limit_is_killed_and_recorded(folder: Path) -> None:
