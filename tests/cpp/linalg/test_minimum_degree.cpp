@@ -9,6 +9,7 @@
 #include "linalg/direct/dense_front.hpp"
 #include "linalg/direct/minimum_degree.hpp"
 #include "stretchmap/linalg/block_ldlt.hpp"
+#include "support/graph.hpp"
 
 TEST_SUITE_BEGIN("linalg");
 
@@ -16,29 +17,13 @@ namespace {
 
 using namespace stretchmap;
 
-struct Graph {
-  explicit Graph(Index n) : rows(n) {
-    for (Index v = 0; v < n; ++v) rows[v].push_back(v);
-  }
-  void join(Index i, Index j) {
-    rows[i].push_back(j);
-    rows[j].push_back(i);
-  }
-  void finish() {
-    for (std::vector<Index>& row : rows) {
-      std::sort(row.begin(), row.end());
-      row.erase(std::unique(row.begin(), row.end()), row.end());
-      col.insert(col.end(), row.begin(), row.end());
-      start.push_back(static_cast<Index>(col.size()));
-    }
-  }
-  Index size() const { return static_cast<Index>(rows.size()); }
-  linalg::MinimumDegree ordered(Index width) const {
-    return linalg::minimum_degree(size(), start.data(), col.data(), width);
-  }
-  std::vector<std::vector<Index>> rows;
-  std::vector<Index> start{0}, col;
-};
+using tests::Graph;
+
+linalg::MinimumDegree ordered(const Graph& graph, Index width) {
+  return graph.apply([&](Index n, const Index* start, const Index* col) {
+    return linalg::minimum_degree(n, start, col, width);
+  });
+}
 
 // A ring, each vertex of which is joined to two more: few steps from anywhere to anywhere.
 Graph wheel(Index n) {
@@ -48,7 +33,6 @@ Graph wheel(Index n) {
     graph.join(v, n);
     graph.join(v, n + 1);
   }
-  graph.finish();
   return graph;
 }
 
@@ -56,13 +40,12 @@ Graph scattered(Index n, unsigned seed) {
   Graph graph(n);
   std::mt19937 engine(seed);
   for (Index k = 0; k < n; ++k) graph.join(engine() % n, engine() % n);  // some by themselves
-  graph.finish();
   return graph;
 }
 
 // What each node's elimination fills is eliminated by those above it alone; \return the flops.
 double check_tree(const Graph& graph, const linalg::Dissection& tree, Index width) {
-  std::vector<Index> place(graph.rows.size(), -1), node_of(graph.rows.size());
+  std::vector<Index> place(graph.rows.size(), -1);
   REQUIRE(tree.order.size() == graph.rows.size());
   for (std::size_t k = 0; k < tree.order.size(); ++k) place[tree.order[k]] = Index(k);
   CHECK(std::count(place.begin(), place.end(), -1) == 0);
@@ -105,22 +88,17 @@ TEST_CASE("eliminations of least degree form one tree, and their work is counted
   for (const Index width : {1, 3}) {
     for (unsigned seed = 0; seed < 20; ++seed) {
       const Graph graph = scattered(1 + 13 * seed, seed);
-      const linalg::MinimumDegree found = graph.ordered(width);
+      const linalg::MinimumDegree found = ordered(graph, width);
       CHECK(check_tree(graph, found.tree, width) == doctest::Approx(found.flops));
     }
   }
-  CHECK(Graph(0).ordered(1).tree.nodes.size() == 1);
+  CHECK(ordered(Graph(0), 1).tree.nodes.size() == 1);
 }
 
 TEST_CASE("vertices are eliminated many at a time where that is less work") {
-  const Index side = 60;
-  Graph graph(side * side);
-  for (Index v = 0; v < graph.size(); ++v) {
-    if ((v + 1) % side) graph.join(v, v + 1);
-    if (v + side < graph.size()) graph.join(v, v + side);
-  }
-  graph.finish();
-  const linalg::MinimumDegree narrow = graph.ordered(1), wide = graph.ordered(3);
+  Graph graph(60 * 60);
+  graph.add_grid(0, 60, 60);
+  const linalg::MinimumDegree narrow = ordered(graph, 1), wide = ordered(graph, 3);
   CHECK(check_tree(graph, narrow.tree, 1) == doctest::Approx(narrow.flops));
   CHECK(check_tree(graph, wide.tree, 3) == doctest::Approx(wide.flops));
   CHECK(8 * narrow.tree.nodes.size() < graph.rows.size());
@@ -130,7 +108,7 @@ TEST_CASE("vertices are eliminated many at a time where that is less work") {
 
 TEST_CASE("where a few vertices are next to all others the order of least degree is taken") {
   const Graph graph = wheel(3000);
-  const linalg::MinimumDegree found = graph.ordered(1);
+  const linalg::MinimumDegree found = ordered(graph, 1);
   CHECK(check_tree(graph, found.tree, 1) == doctest::Approx(found.flops));
   std::vector<Eigen::Triplet<double, Index>> entries;
   for (Index v = 0; v < graph.size(); ++v)
@@ -140,8 +118,7 @@ TEST_CASE("where a few vertices are next to all others the order of least degree
   matrix.setFromTriplets(entries.begin(), entries.end());
   linalg::BlockLdlt<1> factor(matrix);
   CHECK(factor.flops() == doctest::Approx(found.flops));
-  const linalg::Dissection other =
-      linalg::dissect(graph.size(), graph.start.data(), graph.col.data());
+  const linalg::Dissection other = graph.apply(linalg::dissect);
   CHECK(found.flops < 0.1 * check_tree(graph, other, 1));
   factor.factorize(matrix);
   const Vec right = Vec::LinSpaced(graph.size(), -1.0, 2.0);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "linalg/direct/nested_dissection.hpp"
+#include "support/graph.hpp"
 
 TEST_SUITE_BEGIN("linalg");
 
@@ -13,31 +14,9 @@ namespace {
 
 using namespace stretchmap;
 
-struct Graph {
-  explicit Graph(Index n) : rows(n) {}
-  void join(Index i, Index j) {
-    rows[i].push_back(j);
-    rows[j].push_back(i);
-  }
-  // Vertices first, first + 1, ... as a grid, row by row.
-  void add_grid(Index first, Index height, Index width) {
-    for (Index r = 0; r < height; ++r)
-      for (Index c = 0; c < width; ++c) {
-        const Index v = first + r * width + c;
-        if (c + 1 < width) join(v, v + 1);
-        if (r + 1 < height) join(v, v + width);
-      }
-  }
-  linalg::Dissection dissected() const {
-    std::vector<Index> start{0}, col;
-    for (const std::vector<Index>& row : rows) {
-      col.insert(col.end(), row.begin(), row.end());
-      start.push_back(static_cast<Index>(col.size()));
-    }
-    return linalg::dissect(static_cast<Index>(rows.size()), start.data(), col.data());
-  }
-  std::vector<std::vector<Index>> rows;
-};
+using tests::Graph;
+
+linalg::Dissection dissected(const Graph& graph) { return graph.apply(linalg::dissect); }
 
 // First place of the subtree of a node.
 Index begin_of(const linalg::Dissection& found, Index node) {
@@ -54,7 +33,7 @@ TEST_CASE("no edge joins the two sides of a separator") {
   for (const auto& [height, width] : {std::pair<Index, Index>{30, 40}, {90, 70}}) {
     Graph graph(height * width);
     graph.add_grid(0, height, width);
-    const linalg::Dissection found = graph.dissected();
+    const linalg::Dissection found = dissected(graph);
     REQUIRE(found.order.size() == graph.rows.size());
     std::vector<Index> place(graph.rows.size(), -1);
     for (std::size_t k = 0; k < found.order.size(); ++k) place[found.order[k]] = Index(k);
@@ -86,7 +65,7 @@ TEST_CASE("a graph is cut where it is thin, not in the middle") {
   graph.add_grid(0, 20, width);
   graph.add_grid(small, 30, width);
   for (Index c = 0; c < 3; ++c) graph.join(small - width + c, small + c);
-  const linalg::Dissection found = graph.dissected();
+  const linalg::Dissection found = dissected(graph);
   CHECK(found.nodes.back().last - found.nodes.back().first <= 3);
 }
 
