@@ -51,8 +51,8 @@ def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
     How many tets are added is up to rounding, and what is gained goes with it: the plates are
     mapped with solves of three exactnesses.
     """
-    short = [(8, 3, 3), (9, 5, 3), (8, 4, 4), (7, 3, 4)]
-    long = [(15, 3, 3), (16, 3, 3), (18, 3, 3), (8, 4, 3), (12, 5, 3), (14, 4, 3), (17, 3, 3)]
+    short = [(8, 3, 3), (9, 5, 3), (8, 4, 4)]
+    long = [(15, 3, 3), (17, 3, 3), (18, 3, 3), (8, 4, 3)]
     solids = [plate(*shape) for shape in short + long] * 3
     # With time for all rounds on slow processors, too.
     exact = [
