@@ -138,8 +138,8 @@ def glided(plates: list[sm.TetMesh], tols: tuple[float, ...]) -> tuple[int, floa
 
 def test_growing_step_by_step_takes_fewer_steps_to_better_volumes(monkeypatch):
     """Fewer steps where there is an inside, better volumes where there is none but a wall."""
-    thick = [plate(n, 8, 2) for n in range(6, 13)]
-    thin = [plate(n, m, 1) for m in (4, 6, 8) for n in range(6, 15, 2) if m <= n]
+    thick = [plate(n, 8, 2) for n in range(6, 10)]
+    thin = [plate(n, m, 1) for m in (4, 6) for n in range(6, 15, 2)]
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
     steps, error = glided(thick, (0.05,))
     error_thin = glided(thin, (0.05, 0.02))[1]
