@@ -35,7 +35,7 @@ from stretchmap import plot
 
 # Hexahedra bridge the edges of the solid's polyhedron. Were it coarser, of 1000 tets, its surface
 # would be 2.4 per cent larger than theirs, and would exchange more heat.
-solid = sm.samples.bumpy_torus(8_000)
+solid = sm.samples.bumpy_torus(3_000)
 result = sm.volume_map(solid, balance=0.5)
 
 # %%
@@ -83,8 +83,8 @@ fine = heat(tets.refined(1), ElementTetP2())
 runs = {"tets": [], "hexahedra": []}
 for mesh in (tets, tets.refined(1)):
     runs["tets"].append((mesh, *heat(mesh, ElementTetP1())))
-for count in (300, 800, 2_400):
-    grid = sm.hex_mesh(result, n_hexahedra=count)
+for sections, block, rings in ((24, 2, 1), (36, 3, 1), (48, 4, 2)):
+    grid = sm.hex_mesh(result, sections=sections, block=block, rings=rings)
     assert grid.n_invalid == 0
     mesh = from_meshio(grid.to_meshio())
     runs["hexahedra"].append((mesh, *heat(mesh, ElementHex1())))
