@@ -22,7 +22,7 @@ def limb(rings: int) -> sm.TriMesh:
     return with_limb(sm.samples.torus_surface(36, 18), rings, 0.12)
 
 
-@pytest.mark.parametrize("rings", [30, 60, 100, 130])
+@pytest.mark.parametrize("rings", [30, 60, 130])
 def test_a_limb_is_mapped_without_a_fold(rings):
     result = sm.area_map(limb(rings))
     assert result.certificate.certified and result.distortion.flips == 0
