@@ -18,7 +18,7 @@ def bones():
 
 @pytest.fixture(scope="module")
 def found(bones):
-    return sm.population.fit(bones.solids, max_rounds=1, tol=1.0)
+    return sm.population.fit(bones.solids, landmarks=bones.landmarks, max_rounds=1, tol=1.0)
 
 
 def fields(bones, found, change=0.0):

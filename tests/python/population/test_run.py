@@ -41,6 +41,15 @@ def folder(bones, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def landmarks(bones, tmp_path_factory):
+    """Of the three bones, as files: with them no pose is searched for."""
+    place = tmp_path_factory.mktemp("landmarks")
+    for i, points in enumerate(bones.landmarks[:3]):
+        np.savetxt(place / f"bone{i}.csv", points, delimiter=",")
+    return place
+
+
+@pytest.fixture(scope="module")
 def serial(folder, tmp_path_factory):
     return sm.population.fit(folder, folder=tmp_path_factory.mktemp("serial"), **ROUNDS)
 
@@ -74,7 +83,7 @@ def test_a_bad_file_is_named_and_skipped(serial, folder):
     assert record["ok"] is False and record["error"] == serial.skipped["bad"]
 
 
-def test_what_was_the_fault_of_the_machine_is_tried_again(folder, tmp_path, monkeypatch):
+def test_what_was_the_fault_of_the_machine_is_tried_again(folder, landmarks, tmp_path, monkeypatch):
     mapped, calls = task._mapped, []
 
     def once(job):
@@ -84,7 +93,7 @@ def test_what_was_the_fault_of_the_machine_is_tried_again(folder, tmp_path, monk
         return mapped(job)
 
     monkeypatch.setattr(task, "_mapped", once)
-    options = {"folder": tmp_path, "max_rounds": 1, "tol": 0.0}
+    options = {"landmarks": landmarks, "folder": tmp_path, "max_rounds": 1, "tol": 0.0}
     first = sm.population.fit(folder, **options)
     assert set(first.skipped) == {"bad", "bone1"}
     again = sm.population.fit(folder, **options)
@@ -103,29 +112,30 @@ def test_maps_are_kept(serial):
 
 def test_a_map_is_that_of_the_round_it_is_asked_of(bones, tmp_path):
     solids = dict(zip("123", bones.solids, strict=False))  # names that are numbers stay
-    last = sm.population.fit(solids, folder=tmp_path, max_rounds=2, tol=0.0)
-    first = sm.population.fit(solids, folder=tmp_path, max_rounds=1, tol=0.0)
+    options = {"landmarks": bones.landmarks[:3], "folder": tmp_path, "tol": 0.0}
+    last = sm.population.fit(solids, max_rounds=2, **options)
+    first = sm.population.fit(solids, max_rounds=1, **options)
     n = first.mean.n_vertices
     assert first.names == ("1", "2", "3")
     for found in (first, last):
         assert np.array_equal(found.map("2").image[:n], found.correspondences[1])
     assert not np.array_equal(first.map("2").image[:n], last.map("2").image[:n])
     (tmp_path / "maps" / "2-0.npz").unlink()
-    again = sm.population.fit(solids, folder=tmp_path, max_rounds=1, tol=0.0)
+    again = sm.population.fit(solids, max_rounds=1, **options)
     assert np.array_equal(again.map("2").image, first.map("2").image)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pipes of POSIX systems")
-def test_a_pipe_among_the_files_is_named_and_skipped(folder, tmp_path):
+def test_a_pipe_among_the_files_is_named_and_skipped(folder, landmarks, tmp_path):
     os.mkfifo(tmp_path / "pipe.npz")
     paths = [folder / "bone0.npz", folder / "bone1.npz", tmp_path / "pipe.npz"]
-    found = sm.population.fit(paths, max_rounds=1, tol=0.0)
+    found = sm.population.fit(paths, landmarks=landmarks, max_rounds=1, tol=0.0)
     assert found.names == ("bone0", "bone1") and "pipe" in found.skipped["pipe"]
 
 
 def test_no_landmarks_at_all_are_none(bones):
-    plain = sm.population.fit(bones.solids[:3], max_rounds=1, tol=0.0)
-    none = sm.population.fit(bones.solids[:3], landmarks=np.zeros((3, 0, 3)), max_rounds=1, tol=0.0)
+    plain = sm.population.fit(bones.solids[:2], max_rounds=1, tol=0.0)
+    none = sm.population.fit(bones.solids[:2], landmarks=np.zeros((2, 0, 3)), max_rounds=1, tol=0.0)
     same(plain, none)
 
 
@@ -295,8 +305,8 @@ def test_a_script_without_a_guard_is_told_of_it_at_once(tmp_path):
     assert done.stdout.count("run") <= 3  # itself and its workers, once each
 
 
-def test_what_is_skipped_is_told_once(folder, caplog):
-    found = sm.population.fit(folder, max_rounds=2, tol=0.0)
+def test_what_is_skipped_is_told_once(folder, landmarks, caplog):
+    found = sm.population.fit(folder, landmarks=landmarks, max_rounds=2, tol=0.0)
     assert len(found.moved) == 2 and set(found.skipped) == {"bad"}
     assert sum("bad is skipped" in r.getMessage() for r in caplog.records) == 1
 
