@@ -108,7 +108,7 @@ def test_grids_of_very_long_solids_are_valid_and_do_not_swell(vertebra_map, seed
     assert abs(mesh.volume / long.volume - 1.0) < 0.02
 
 
-@pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (60, 3, 2)])
+@pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (36, 3, 2)])
 def test_grids_of_other_sizes_are_valid_too(vertebra_map, sections, block, rings):
     mesh = hex_mesh(vertebra_map, sections=sections, block=block, rings=rings)
     assert mesh.n_invalid == 0 and len(mesh.H) == sections * block * (block + 4 * rings)
@@ -117,7 +117,7 @@ def test_grids_of_other_sizes_are_valid_too(vertebra_map, sections, block, rings
 def test_stages_are_reported(bumpy_map):
     seen = []
     hex_mesh(
-        bumpy_map, n_hexahedra=300,
+        bumpy_map, sections=20, block=1, rings=1,
         progress=lambda stage, done, total, **values: seen.append((stage, values)),
     )  # fmt: skip
     stages = [stage for stage, _ in seen]
@@ -150,12 +150,13 @@ def test_of_a_large_grid_half_the_numbers_choose(bumpy_map, monkeypatch):
     monkeypatch.setattr(levels, "best_starts", best_starts)
     monkeypatch.setattr(levels, "optimized", optimized)
     solid = bumpy_map.mesh
-    even = np.array([[16, 2, 2], [24, 4, 2]])
+    even = np.array([[16, 2, 2], [24, 2, 2]])
     start = levels.coarse_grid(bumpy_map, solid, even, 2, None)
-    assert compared.pop() == [[8, 1, 1], [12, 2, 1]] and list(start.numbers) in even.tolist()
+    assert compared.pop() == [[8, 1, 1], [12, 1, 1]] and list(start.numbers) in even.tolist()
     sections, block, rings = start.numbers
     assert done == [len(start.layout.H)] == [sections * block * (block + 4 * rings)]
     assert missed_volume(start.V, start.layout.H, solid.surface) < 0.005
+    monkeypatch.setattr(levels, "optimized", lambda V, *rest: V)
     for candidates, times in ((even, 1), (even + 1, 2)):
         levels.coarse_grid(bumpy_map, solid, candidates, times, None)
         assert compared.pop() == candidates.tolist()
