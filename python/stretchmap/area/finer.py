@@ -64,8 +64,9 @@ _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
 _LONG, _FEW, _SLIVERS = 10.0, 0.01, 3.0  # slivers: a share of faces longer than that; their factor
-_CLOSE = 1.5  # times the face SD wanted: further steps lead there sooner than more faces do
-_GAIN, _IDLE = 0.9, 2  # rounds in a row that leave more of the error end them
+# What a round leaves of the error at most, where steps go on as they are, and where more vertices
+# are worth it; those that leave more, so many in a row, end them.
+_GAIN, _IDLE = 0.9, 2
 
 
 def goal(surface: TriMesh, tol: float) -> float:
@@ -359,8 +360,9 @@ def mapped_finer(
 ) -> tuple[Made, Finer] | None:
     """Newton steps, then more edges halved where areas are off; the best of all, records added.
 
-    Without an edge halved yet, ``finer`` is what steps have led to already. None if faces stay
-    folded.
+    Not before steps lead no further: all areas near a new vertex are off again, and the finer the
+    surface, the fewer steps are left. Without an edge halved yet, ``finer`` is what steps have led
+    to already. None if faces stay folded.
     """
     clock = time.perf_counter()
     error, best = np.inf, None if finer.added.n_split else (made, finer)
@@ -403,20 +405,21 @@ def mapped_finer(
         history.extend(unfolding)
         return newton.least_facing() > 0.0
 
-    last, reason, pace = False, made.reason, Pace(_HEAVY)
-    for round_ in range(_ROUNDS + 1):
-        first = round_ == 0 and at_once
-        # What the steps on a surface have made good wants no more vertices.
-        good = wanted * (_CLOSE if cut_short(reason) else 1.0)
-        enough = not first and float(finer.ratios().std()) <= good
-        halved = finer if first else None if enough else finer.where_off(steps.tol)
-        start = None if halved is None else begun(halved)
-        if start is not None:
-            finer, pace = start
-        elif cut_short(reason) and not last and work.steps(finer.level.surface.n_faces):
-            last = True
-        else:
-            break
+    last = falling = False
+    reason, pace, round_ = made.reason, Pace(_HEAVY), 0
+    while round_ <= _ROUNDS:
+        if not falling:
+            first = round_ == 0 and at_once
+            enough = not first and float(finer.ratios().std()) <= wanted
+            halved = finer if first else None if enough else finer.where_off(steps.tol)
+            start = None if halved is None else begun(halved)
+            round_ += 1
+            if start is not None:
+                finer, pace = start
+            elif cut_short(reason) and not last and work.steps(finer.level.surface.n_faces):
+                last = True
+            else:
+                break
         newton = finer.newton()
         n_faces = finer.level.surface.n_faces
         affordable = work.steps(n_faces)
@@ -443,11 +446,13 @@ def mapped_finer(
         if with_rings and worth_rings(measured, asked.tol):
             work.spend_on_rings(n_faces)
         _log.info("%d edges halved: face SD %.2e", finer.added.n_split, measured.face_std)
+        begin = next(record.element_std for record in records)
+        falling = not last and cut_short(reason) and measured.face_std <= _GAIN * begin
         before, now = error, measured.face_std if measured.flips == 0 else np.inf
         if now < error:
             what = Made(newton.angles, made.phase, made.ratio, [], converged, reason)
             error, best = now, (what, finer)
-        idle = 0 if now <= _GAIN * before else idle + 1
+        idle = 0 if now <= _GAIN * before else idle + (not falling)
         if (error <= wanted and not cut_short(reason)) or idle == _IDLE:
             break
     if best is None:

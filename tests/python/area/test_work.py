@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import time
 from types import SimpleNamespace
 
@@ -288,6 +289,32 @@ def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> 
     work = Work(n_faces, 100.0 * n_faces, 40)  # less than brings the energy to rest
     found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
     assert found is not None and len(asked) >= 2 and found[1].added.n_split
-    assert [record.iteration for record in found[0].history].count(0) == 2
     # All but a share kept for rings, which did not become exact here.
     assert work.steps(found[1].level.surface.n_faces) <= 1
+
+
+def test_vertices_are_added_once_steps_lead_no_further(monkeypatch) -> None:
+    surface = sm.samples.bumpy_torus(1000).surface
+    start = start_of(surface)
+    events: list[str] = []
+    finish_areas, where_off = finer.finish_areas, Finer.where_off
+
+    def steps(newton, *given):
+        found = finish_areas(newton, *given)
+        gained = newton.measures().face_std <= 0.9 * found[0][0].element_std
+        events.append("fell" if gained and "most steps done" in found[2] else "ended")
+        return found
+
+    def halving(self: Finer, tol: float) -> Finer | None:
+        events.append("halved")
+        return where_off(self, tol)
+
+    monkeypatch.setattr(finer, "finish_areas", steps)
+    monkeypatch.setattr(Finer, "where_off", halving)
+    monkeypatch.setattr(finer, "ROUND_STEPS", 2)
+    made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
+    work = Work(surface.n_faces, 1e3 * surface.n_faces, 40)
+    mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
+    after = list(itertools.pairwise(events))
+    assert ("fell", "fell") in after and ("ended", "halved") in after
+    assert ("fell", "halved") not in after
