@@ -5,6 +5,7 @@
 #include "stretchmap/area/chart_newton.hpp"
 #include "stretchmap/area/coarsen.hpp"
 #include "stretchmap/area/edge_sags.hpp"
+#include "stretchmap/area/halved_chart.hpp"
 #include "stretchmap/area/phase_energies.hpp"
 #include "stretchmap/area/straight_drawing.hpp"
 #include "stretchmap/area/surface_newton.hpp"
@@ -26,6 +27,14 @@ void bind_chart(py::module_& m) {
       .def_readonly("faces", &SurfaceChart::faces)
       .def_readonly("shift_u", &SurfaceChart::shift_u)
       .def_readonly("shift_v", &SurfaceChart::shift_v);
+  py::class_<HalvedChart>(m, "HalvedChart")
+      .def(py::init(&halved_chart), py::arg("chart"), py::arg("angles").noconvert(),
+           py::arg("halved"), release_gil())
+      .def_readonly("angles", &HalvedChart::angles)
+      .def_readonly("shift_u", &HalvedChart::shift_u)
+      .def_readonly("shift_v", &HalvedChart::shift_v);
+  m.def("chart_forms", &chart_forms, py::arg("topology"), py::arg("shift_u").noconvert(),
+        py::arg("shift_v").noconvert(), release_gil());
   m.def("turn_areas", &turn_areas, py::arg("chart"), py::arg("turns").noconvert(), release_gil());
   m.def("straight_drawing", &straight_drawing, py::arg("faces").noconvert(), py::arg("n"),
         py::arg("corners"), release_gil());

@@ -1,6 +1,7 @@
 #include "arrays.hpp"
 #include "stretchmap/mesh/diagnosis.hpp"
 #include "stretchmap/mesh/fill_borders.hpp"
+#include "stretchmap/mesh/halved_faces.hpp"
 #include "stretchmap/mesh/longest_first.hpp"
 #include "stretchmap/mesh/orient.hpp"
 #include "stretchmap/mesh/overconstrained.hpp"
@@ -20,6 +21,12 @@ void bind_topology(py::module_& m) {
       .def_readonly("twin", &SurfaceTopology::twin)
       .def_readonly("edge", &SurfaceTopology::edge)
       .def_readonly("edges", &SurfaceTopology::edges);
+  py::class_<HalvedFaces>(m, "HalvedFaces")
+      .def(py::init(&halve_edges), py::arg("topology"), py::arg("marked").noconvert(),
+           py::arg("lengths").noconvert(), release_gil())
+      .def_readonly("ends", &HalvedFaces::ends)
+      .def_readonly("faces", &HalvedFaces::faces)
+      .def_readonly("parent", &HalvedFaces::parent);
   py::class_<TetBoundary>(m, "TetBoundary")
       .def(py::init(
                [](const TetsRef& tets, Index n) { return tet_boundary(tets, n, signal_poll()); }),

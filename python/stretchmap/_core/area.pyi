@@ -4,12 +4,24 @@ import numpy
 import numpy.typing
 import stretchmap._core.mesh
 import typing
-__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfacePatch', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'coarsen', 'edge_sags', 'phase_energies', 'prolong', 'straight_drawing', 'turn_areas']
+__all__: list[str] = ['ChartNewton', 'ChartStep', 'CoarseSurface', 'GlideProblem', 'HalvedChart', 'NewtonStep', 'SemStep', 'SurfaceChart', 'SurfaceMeasures', 'SurfaceNewton', 'SurfacePatch', 'SurfaceReference', 'SurfaceSem', 'SurfaceWeights', 'angle_from_equal_area', 'chart_forms', 'coarsen', 'edge_sags', 'phase_energies', 'prolong', 'straight_drawing', 'turn_areas']
 class SurfaceChart:
     def __init__(self, topology: stretchmap._core.mesh.SurfaceTopology, forms: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]) -> None:
         ...
     @property
     def faces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
+        ...
+    @property
+    def shift_u(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
+        ...
+    @property
+    def shift_v(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
+        ...
+class HalvedChart:
+    def __init__(self, chart: SurfaceChart, angles: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], halved: stretchmap._core.mesh.HalvedFaces) -> None:
+        ...
+    @property
+    def angles(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
         ...
     @property
     def shift_u(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
@@ -149,6 +161,8 @@ class SurfacePatch:
     def vertices(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         ...
 def angle_from_equal_area(s: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"], tube_ratio: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    ...
+def chart_forms(topology: stretchmap._core.mesh.SurfaceTopology, shift_u: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], shift_v: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"]) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, n]"]:
     ...
 def coarsen(points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"], chart: SurfaceChart, turns: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]", "flags.c_contiguous"], n_faces: typing.SupportsInt | typing.SupportsIndex) -> CoarseSurface:
     ...

@@ -2,7 +2,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['BorderFill', 'OverconstrainedElements', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'longest_first', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
+__all__: list[str] = ['BorderFill', 'HalvedFaces', 'OverconstrainedElements', 'Refinement', 'SolidDiagnosis', 'SurfaceDiagnosis', 'SurfaceTopology', 'TetBoundary', 'edge_lengths', 'enclosed_volume', 'face_area_vectors', 'face_areas', 'longest_first', 'misoriented_faces', 'misoriented_tets', 'tet_edges', 'tet_volumes']
 class SurfaceTopology:
     def __init__(self, faces: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
@@ -20,6 +20,18 @@ class SurfaceTopology:
         ...
     @property
     def twin(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        ...
+class HalvedFaces:
+    def __init__(self, topology: SurfaceTopology, marked: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"], lengths: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]) -> None:
+        ...
+    @property
+    def ends(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]"]:
+        ...
+    @property
+    def faces(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]:
+        ...
+    @property
+    def parent(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
         ...
 class TetBoundary:
     def __init__(self, tets: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 4]", "flags.c_contiguous"], n_vertices: typing.SupportsInt | typing.SupportsIndex) -> None:

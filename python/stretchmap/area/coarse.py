@@ -104,19 +104,7 @@ def levels(finest: Level) -> list[Level]:
             break  # hardly a vertex can go
         surface = TriMesh(fine.surface.V[coarse.kept], coarse.chart.faces)
         turns = np.ascontiguousarray(fine.turns[coarse.kept])
-        forms = forms_of(surface, coarse.chart.shift_u, coarse.chart.shift_v)
+        forms = _core.area.chart_forms(surface.topology, coarse.chart.shift_u, coarse.chart.shift_v)
         found[-1] = replace(fine, coarse=coarse)
         found.append(Level.of(surface, turns, forms, fine.aspect))
     return found
-
-
-def forms_of(
-    surface: TriMesh, shift_u: NDArray[np.int32], shift_v: NDArray[np.int32]
-) -> NDArray[np.int32]:
-    """The 1-forms (2, e) whose sums along the faces' edges are the corners' shifts, (m, 3) each."""
-    forms = np.zeros((2, len(surface.edges)), np.int32)
-    ascending = surface.F < np.roll(surface.F, -1, axis=1)
-    edge = surface.topology.edge.reshape(-1, 3)[ascending]
-    for form, shift in zip(forms, (shift_u, shift_v), strict=True):
-        form[edge] = (np.roll(shift, -1, axis=1) - shift)[ascending]
-    return forms

@@ -21,7 +21,7 @@ from ..base.torus import TWO_PI, Torus
 from ..maps.history import IterationRecord
 from ..mesh.halved_faces import SurfaceRefinement, halve_edges
 from ..mesh.surfaces import TriMesh
-from .coarse import Level, forms_of
+from .coarse import Level
 from .finish import (
     Pace,
     Steps,
@@ -56,6 +56,7 @@ _HOPELESS, _LOST = 0.3, 0.5
 _OFF = 4.0  # times the tolerance: faces off by more get more vertices where areas are not good
 _LITTLE = 0.1  # sag that is not what makes a face's area wrong
 _ROUNDS = 3
+_FINER = 1.5  # times as many faces there may be after a round
 _LEAST_STEPS = 10  # from where areas are nearly right, however little work is left
 ROUND_STEPS = 20  # of each round; fewer are not worth it
 _UNFOLDING = (0.6, (10, 60))  # a share of the work, and steps, until no face is folded
@@ -64,8 +65,9 @@ _HEAVY = 4.0**6  # weight of the area term a round begins with
 _GOOD = 2.0  # times the tolerance
 _LEAST_GOOD = 0.01
 _LONG, _FEW, _SLIVERS = 10.0, 0.01, 3.0  # slivers: a share of faces longer than that; their factor
-# What a round leaves of the error at most, where steps go on as they are, and where more vertices
-# are worth it; those that leave more, so many in a row, end them.
+_CLOSE = 1.5  # times the face SD wanted: further steps lead there sooner than more faces do
+# What steps and rounds leave of the error at most, where more of them follow at once; so many
+# rounds in a row that leave more end them.
 _GAIN, _IDLE = 0.9, 2
 
 
@@ -181,15 +183,9 @@ class Finer:
         """With those edges halved, in the chart, too: no face turns over there."""
         level, surface = self.level, self.level.surface
         done = halve_edges(surface, marked, self.lengths())
-        shifts = np.stack([level.chart.shift_u, level.chart.shift_v], axis=-1)
-        corners = self.angles[surface.F] + TWO_PI * shifts
-        corners = np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
-        corners = corners[done.parent[:, None], done.corners]
-        angles = np.empty((done.surface.n_vertices, 2))
-        angles[done.surface.F] = corners  # any branch does
-        angles[: len(self.angles)] = self.angles
-        shifts = np.rint((corners - angles[done.surface.F]) / TWO_PI).astype(np.int32)
-        forms = forms_of(done.surface, shifts[..., 0], shifts[..., 1])
+        chart = _core.area.HalvedChart(level.chart, self.angles, done.corners)
+        angles = chart.angles
+        forms = _core.area.chart_forms(done.surface.topology, chart.shift_u, chart.shift_v)
         finer = Level.of(done.surface, angles / TWO_PI, forms, level.aspect)
         return replace(self, level=finer, angles=angles, added=self.added.after(done))
 
@@ -360,9 +356,9 @@ def mapped_finer(
 ) -> tuple[Made, Finer] | None:
     """Newton steps, then more edges halved where areas are off; the best of all, records added.
 
-    Not before steps lead no further: all areas near a new vertex are off again, and the finer the
-    surface, the fewer steps are left. Without an edge halved yet, ``finer`` is what steps have led
-    to already. None if faces stay folded.
+    Where a finer surface had not the steps it takes, not before they lead no further: all areas
+    near a new vertex are off again. Without an edge halved yet, ``finer`` is what steps have led to
+    already. None if faces stay folded.
     """
     clock = time.perf_counter()
     error, best = np.inf, None if finer.added.n_split else (made, finer)
@@ -410,7 +406,9 @@ def mapped_finer(
     while round_ <= _ROUNDS:
         if not falling:
             first = round_ == 0 and at_once
-            enough = not first and float(finer.ratios().std()) <= wanted
+            # What the steps on a surface have made good wants no more vertices.
+            good = wanted * (_CLOSE if cut_short(reason) else 1.0)
+            enough = not first and float(finer.ratios().std()) <= good
             halved = finer if first else None if enough else finer.where_off(steps.tol)
             start = None if halved is None else begun(halved)
             round_ += 1
@@ -447,7 +445,9 @@ def mapped_finer(
             work.spend_on_rings(n_faces)
         _log.info("%d edges halved: face SD %.2e", finer.added.n_split, measured.face_std)
         begin = next(record.element_std for record in records)
-        falling = not last and cut_short(reason) and measured.face_std <= _GAIN * begin
+        few = work.steps(int(_FINER * n_faces)) < sum(_APPROACH) + _ROUNDS * ROUND_STEPS
+        gained = measured.face_std <= _GAIN * begin
+        falling = few and gained and cut_short(reason) and not last
         before, now = error, measured.face_std if measured.flips == 0 else np.inf
         if now < error:
             what = Made(newton.angles, made.phase, made.ratio, [], converged, reason)

@@ -293,7 +293,7 @@ def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> 
     assert work.steps(found[1].level.surface.n_faces) <= 1
 
 
-def test_vertices_are_added_once_steps_lead_no_further(monkeypatch) -> None:
+def test_vertices_are_added_once_steps_lead_no_further_if_few_are_left(monkeypatch) -> None:
     surface = sm.samples.bumpy_torus(1000).surface
     start = start_of(surface)
     events: list[str] = []
@@ -313,8 +313,11 @@ def test_vertices_are_added_once_steps_lead_no_further(monkeypatch) -> None:
     monkeypatch.setattr(Finer, "where_off", halving)
     monkeypatch.setattr(finer, "ROUND_STEPS", 2)
     made = Made(start.angles, 0.0, start.ratio, [], reason="most steps done")
-    work = Work(surface.n_faces, 1e3 * surface.n_faces, 40)
-    mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
-    after = list(itertools.pairwise(events))
-    assert ("fell", "fell") in after and ("ended", "halved") in after
-    assert ("fell", "halved") not in after
+    for steps_left in (80, 1000):
+        events.clear()
+        work = Work(surface.n_faces, 1.0 * steps_left * surface.n_faces, 40)
+        mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
+        after = list(itertools.pairwise(events))
+        few = steps_left == 80
+        assert (("fell", "fell") in after) == few and (("fell", "halved") in after) != few
+        assert ("ended", "halved") in after or not few

@@ -51,6 +51,41 @@ def test_the_longest_edge_of_a_face_is_halved_with_any_other() -> None:
     assert cut[longest[cut[edge].any(axis=1)]].all()
 
 
+@pytest.mark.parametrize("pattern", range(1, 8))
+def test_a_face_is_cut_by_the_shorter_median(pattern: int) -> None:
+    surface = sm.samples.torus_surface(24, 12)
+    surface = sm.TriMesh(surface.V * [1.0, 1.3, 0.8], surface.F)
+    edge = surface.topology.edge.reshape(-1, 3)
+    lengths = lengths_of(surface)
+    longest = lengths[edge[0]].argmax()
+    marked = np.zeros(len(lengths), bool)
+    marked[edge[0][[k for k in range(3) if pattern >> k & 1]]] = True
+    done = halve_edges(surface, marked, lengths)
+    parts = done.surface.F[done.parent == 0]
+    cut = marked[edge[0]] | (np.arange(3) == longest)
+    assert len(parts) == 1 + cut.sum()
+    if cut.sum() == 2:  # corners that meet at the edge left whole
+        whole = int((~cut).argmax())
+        ends = surface.F[0][[whole, (whole + 1) % 3]]
+        ids = {tuple(pair): surface.n_vertices + k for k, pair in enumerate(done.edges.tolist())}
+        far = surface.F[0][(whole + 2) % 3]
+        medians = {}
+        for here, other in (ends, ends[::-1]):
+            midpoint = ids[min(far, other), max(far, other)]
+            medians[np.linalg.norm(surface.V[here] - done.surface.V[midpoint])] = (here, midpoint)
+        here, midpoint = medians[min(medians)]
+        assert any({here, midpoint} <= set(part) for part in parts.tolist())
+
+
+def test_flags_and_lengths_are_of_the_edges() -> None:
+    surface = sm.samples.torus_surface(24, 12)
+    lengths = lengths_of(surface)
+    with pytest.raises(ArrayError, match="for each edge"):
+        halve_edges(surface, np.ones(3, bool), lengths)
+    with pytest.raises(ArrayError, match="for each edge"):
+        halve_edges(surface, np.ones(len(lengths), bool), lengths[1:])
+
+
 def test_values_are_carried_over_pass_by_pass() -> None:
     surface = sm.samples.torus_surface(24, 12)
     finer = SurfaceRefinement.of(surface)
