@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -86,13 +88,14 @@ def rigid_poses(moving: TriMesh, goal: TriMesh) -> list[Similarity]:
 def looks_mirrored(moving: TriMesh, goal: TriMesh) -> bool:
     """Whether a surface, as a rigid body, comes clearly closer to the mirror image of another."""
     mirrored = TriMesh(goal.V * [-1.0, 1.0, 1.0], goal.F[:, ::-1])
-    distances = [_ranked(moving, other)[0][0][0] for other in (mirrored, goal)]
-    return distances[0] < _MIRRORED * distances[1]
+    plain, reflected = (_ranked(moving, other)[0][0][0] for other in (goal, mirrored))
+    return reflected < _MIRRORED * plain
 
 
+@lru_cache(maxsize=1)  # who asks for poses asks for mirror images of the same surfaces next
 def _ranked(
     moving: TriMesh, goal: TriMesh
-) -> tuple[list[tuple[float, Array, Array]], _Samples, _Samples]:
+) -> tuple[tuple[tuple[float, Array, Array], ...], _Samples, _Samples]:
     """Distance, rotation and shift of the best starts, closest first, and what was compared."""
     first, second = _Samples(moving, _FEW), _Samples(goal, _FEW)
     base = first.axes.T @ second.axes
@@ -101,8 +104,7 @@ def _ranked(
     coarse.sort(key=lambda pose: pose[0])
     first, second = _Samples(moving, _MANY), _Samples(goal, _MANY)
     fine = [_improved(first, second, pose[1], pose[2], _LAST) for pose in coarse[:_KEPT]]
-    fine.sort(key=lambda pose: pose[0])
-    return fine, first, second
+    return tuple(sorted(fine, key=lambda pose: pose[0])), first, second
 
 
 def _improved(

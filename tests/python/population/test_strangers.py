@@ -10,9 +10,9 @@ import pytest
 
 import stretchmap as sm
 from stretchmap.errors import LandmarkError
-from stretchmap.population import correspond
+from stretchmap.population import correspond, pose
 from stretchmap.population.fitting import Anchors, Template
-from stretchmap.population.pose import looks_mirrored
+from stretchmap.population.pose import looks_mirrored, rigid_poses
 
 SIDES = np.array([-1.0, 1.0, 1.0])
 
@@ -40,6 +40,27 @@ def test_a_mirror_image_is_told_from_the_others(bones):
     for one, other in itertools.combinations(solids, 2):
         assert not looks_mirrored(one.surface, other.surface)
         assert looks_mirrored(one.surface, mirrored(other).surface)
+
+
+def test_poses_are_searched_once_for_what_is_asked_of_the_same_surfaces(bones, monkeypatch):
+    one, other, third = (solid.surface for solid in bones.solids[:3])
+    improved, steps = pose._improved, []
+
+    def counted(*given):
+        steps.append(len(given))
+        return improved(*given)
+
+    monkeypatch.setattr(pose, "_improved", counted)
+    found = rigid_poses(one, other)
+    once = len(steps)
+    looks_mirrored(one, other)  # the mirror image is new
+    assert once > 0 and len(steps) == 2 * once
+    rigid_poses(one, third)  # others are not taken for them
+    again = rigid_poses(one, other)
+    assert len(steps) == 4 * once
+    for before, after in zip(found, again, strict=True):
+        assert (before.rotation == after.rotation).all()
+        assert (before.shift == after.shift).all()
 
 
 def test_where_there_is_no_side_none_is_wrong(bones):
