@@ -1,6 +1,7 @@
 #include "stretchmap/area/halved_chart.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "stretchmap/base/errors.hpp"
 #include "stretchmap/base/torus.hpp"
@@ -10,9 +11,8 @@ namespace stretchmap::area {
 HalvedChart halved_chart(const SurfaceChart& chart, const Points2Ref& angles,
                          const mesh::HalvedFaces& halved) {
   const Index n = chart.n_vertices, m = static_cast<Index>(halved.faces.rows());
-  const bool fits = m == 0 || (halved.parent(m - 1) < chart.faces.rows() &&
-                               halved.faces.maxCoeff() < n + halved.ends.rows());
-  if (angles.rows() != n || !fits)
+  const bool same_faces = m > 0 && halved.parent(m - 1) + 1 == chart.faces.rows();
+  if (angles.rows() != n || !same_faces || halved.faces.maxCoeff() + 1 != n + halved.ends.rows())
     throw Error("ArrayError", "the chart is of another surface than the edges halved");
   Points2 corners(3 * m, 2);
   Points2 found(n + halved.ends.rows(), 2);
@@ -31,11 +31,11 @@ HalvedChart halved_chart(const SurfaceChart& chart, const Points2Ref& angles,
     }
   }
   found.topRows(n) = angles;
-  HalvedChart done{found, Faces(m, 3), Faces(m, 3)};
+  HalvedChart done{std::move(found), Faces(m, 3), Faces(m, 3)};
   for (Index f = 0; f < m; ++f)
     for (int k = 0; k < 3; ++k) {
       const Eigen::RowVector2d turns =
-          (corners.row(3 * f + k) - found.row(halved.faces(f, k))) / kTwoPi;
+          (corners.row(3 * f + k) - done.angles.row(halved.faces(f, k))) / kTwoPi;
       done.shift_u(f, k) = static_cast<Index>(std::lrint(turns.x()));
       done.shift_v(f, k) = static_cast<Index>(std::lrint(turns.y()));
     }

@@ -444,9 +444,8 @@ def mapped_finer(
         if with_rings and worth_rings(measured, asked.tol):
             work.spend_on_rings(n_faces)
         _log.info("%d edges halved: face SD %.2e", finer.added.n_split, measured.face_std)
-        begin = next(record.element_std for record in records)
         few = work.steps(int(_FINER * n_faces)) < sum(_APPROACH) + _ROUNDS * ROUND_STEPS
-        gained = measured.face_std <= _GAIN * begin
+        gained = measured.face_std <= _GAIN * records[0].element_std
         falling = few and gained and cut_short(reason) and not last
         before, now = error, measured.face_std if measured.flips == 0 else np.inf
         if now < error:

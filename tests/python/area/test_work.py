@@ -289,6 +289,9 @@ def test_steps_left_are_taken_where_no_more_edges_can_be_halved(monkeypatch) -> 
     work = Work(n_faces, 100.0 * n_faces, 40)  # less than brings the energy to rest
     found = mapped_finer(start, made, Steps(100, 1e-9, np.inf), 0.0, False, None, work)
     assert found is not None and len(asked) >= 2 and found[1].added.n_split
+    iterations = [record.iteration for record in found[0].history]
+    last = len(iterations) - 1 - iterations[::-1].index(0)
+    assert max(iterations[:last]) <= 3 < iterations[-1]  # in the end all at once
     # All but a share kept for rings, which did not become exact here.
     assert work.steps(found[1].level.surface.n_faces) <= 1
 

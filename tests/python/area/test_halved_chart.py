@@ -1,0 +1,34 @@
+"""Charts of surfaces whose edges are halved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from small_handles import small_handle, start_of
+from stretchmap import _core
+from stretchmap.base.torus import TWO_PI
+from stretchmap.errors import ArrayError
+from stretchmap.mesh.halved_faces import halve_edges
+
+
+def test_a_chart_is_halved_with_its_surface() -> None:
+    start = start_of(small_handle(2))
+    level, rng = start.level, np.random.default_rng(5)
+    marked = rng.random(len(level.surface.edges)) < 0.3
+    finer = start.halved(marked)
+    areas = _core.area.turn_areas(finer.level.chart, finer.angles / TWO_PI)
+    assert (areas > 0.0).all()
+    kept = np.bincount(finer.added.parent_face, areas)
+    assert np.allclose(kept, _core.area.turn_areas(level.chart, start.angles / TWO_PI), rtol=1e-9)
+    for n_u in (12, 200):  # of fewer faces, and of more
+        other = sm.samples.torus_surface(n_u, 30)
+        n_edges = len(other.edges)
+        halved = halve_edges(other, np.ones(n_edges, bool), np.ones(n_edges)).corners
+        with pytest.raises(ArrayError, match="another surface"):
+            _core.area.HalvedChart(level.chart, start.angles, halved)
+    with pytest.raises(ArrayError, match="for each face"):
+        _core.area.chart_forms(
+            level.surface.topology, finer.level.chart.shift_u, level.chart.shift_v
+        )
