@@ -20,6 +20,12 @@ def test_a_chart_is_halved_with_its_surface() -> None:
     finer = start.halved(marked)
     areas = _core.area.turn_areas(finer.level.chart, finer.angles / TWO_PI)
     assert (areas > 0.0).all()
+    i, j = level.surface.edges.T
+    along = start.angles[j] - start.angles[i] + TWO_PI * level.forms.T
+    middle = {(a, b): start.angles[a] + 0.5 * d for a, b, d in zip(i, j, along, strict=True)}
+    ends = finer.added.halved[-1]
+    found = finer.angles[len(start.angles) :] - [middle[a, b] for a, b in ends]
+    assert np.allclose(found / TWO_PI, np.rint(found / TWO_PI), atol=1e-12)
     kept = np.bincount(finer.added.parent_face, areas)
     assert np.allclose(kept, _core.area.turn_areas(level.chart, start.angles / TWO_PI), rtol=1e-9)
     for n_u in (12, 200):  # of fewer faces, and of more

@@ -37,11 +37,16 @@ def test_halving_edges_changes_no_point_of_the_surface(share: float) -> None:
     assert not turned.any()
 
 
-def test_the_longest_edge_of_a_face_is_halved_with_any_other() -> None:
+@pytest.mark.parametrize("seed", [None, 0, 1])
+def test_the_longest_edge_of_a_face_is_halved_with_any_other(seed: int | None) -> None:
     surface = sm.samples.torus_surface(24, 12)
     lengths = lengths_of(surface)
+    if seed is not None:  # chains of longer and longer edges, either way
+        lengths = np.random.default_rng(seed).random(len(lengths))
     marked = np.arange(len(surface.edges)) == lengths.argmin()
-    halved = halve_edges(surface, marked, lengths_of(surface)).edges
+    if seed is not None:
+        marked |= np.arange(len(lengths)) % 50 == 0
+    halved = halve_edges(surface, marked, lengths).edges
     assert len(halved) > 1
     index = {tuple(edge): k for k, edge in enumerate(surface.edges.tolist())}
     cut = np.zeros(len(surface.edges), bool)
