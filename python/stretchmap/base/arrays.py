@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -256,14 +255,20 @@ def describe(what: str, ids: ArrayLike, limit: int = 5) -> str:
 
 
 def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
-    if np.ma.is_masked(values):
-        raise ArrayError(f"{name} is a masked array with masked entries; fill or drop them")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # ragged lists are objects with a warning in some NumPy
-            return np.asarray(values)
+        array, masked = np.asarray(values), _has_masked(values)
     except Exception as error:  # whatever an object's own conversion raises
         raise ArrayError(f"{name} is not a rectangular array of numbers: {error}") from error
+    if masked:
+        raise ArrayError(f"{name} has masked entries; fill or drop them")
+    return array
+
+
+def _has_masked(values: Any) -> bool:
+    """Whether entries are masked; in lists, too, which NumPy takes for NaN or what is beneath."""
+    if isinstance(values, (list, tuple)):
+        return any(map(_has_masked, values))
+    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
 
 
 def _as_doubles(raw: NDArray[Any], name: str) -> NDArray[np.float64]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,7 @@ class Explosive:
 GRID = np.arange(12.0).reshape(4, 3)
 NO_NUMBERS = {
     "masked": np.ma.masked_less(GRID, 2.0),
+    "masked rows": list(np.ma.masked_less(GRID, 2.0)),
     "complex": GRID + 1j,
     "truth": GRID > 2,
     "text": GRID.astype(str),
@@ -45,6 +48,25 @@ def test_no_numbers(name):
     ):
         with pytest.raises(ArrayError, match="a "):
             convert(NO_NUMBERS[name])
+
+
+@pytest.mark.filterwarnings("ignore:Warning. converting a masked element")
+def test_a_masked_entry_of_a_list_is_no_nan():
+    with pytest.raises(ArrayError, match="a has masked entries"):
+        as_reals([1.0, np.ma.masked], "a", (2,), finite=False)
+
+
+def test_a_conversion_leaves_the_filters_of_warnings_alone():
+    """They belong to the process: threads that overlap would restore those of one another."""
+    seen = []
+
+    class Lazy:
+        def __array__(self, *args, **keywords):
+            seen.append(list(warnings.filters))
+            return GRID
+
+    as_points(Lazy())
+    assert seen == [warnings.filters]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
