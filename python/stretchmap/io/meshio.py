@@ -13,6 +13,7 @@ import io
 import logging
 import mmap
 import re
+import threading
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,6 +27,9 @@ from .arrays import MeshArrays
 from .cells import Block, simplices
 
 _log = logging.getLogger("stretchmap")
+# Standard output and the filters of warnings belong to the process: who restores them last would
+# restore what another thread has put there.
+_one_at_a_time = threading.Lock()
 
 # Number of cells in the text of a file.
 _ANNOUNCED = {
@@ -125,6 +129,7 @@ def _guarded(path: Path, system: tuple[type[Exception], ...] = ()) -> Iterator[N
     output = io.StringIO()
     try:
         with (
+            _one_at_a_time,
             contextlib.redirect_stdout(output),
             contextlib.redirect_stderr(output),
             warnings.catch_warnings(),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import subprocess
 import sys
+import threading
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -205,6 +207,37 @@ def test_big_endian_vtk(solid, tmp_path):
     assert mesh.V.dtype == np.float64 and mesh.V.dtype.isnative
     np.testing.assert_array_equal(mesh.T, solid.T)
     mesh.require_solid_torus()
+
+
+def test_files_read_in_two_threads_leave_standard_output_and_warnings_alone(tmp_path, monkeypatch):
+    meshio = pytest.importorskip("meshio")
+    started, overlapped, done = (threading.Event() for _ in range(3))
+
+    def first(path):
+        started.set()
+        overlapped.wait(0.1)
+        raise ValueError
+
+    def second(path):
+        overlapped.set()
+        done.wait(10.0)
+        raise ValueError
+
+    def attempt(name, reader):
+        (tmp_path / name).write_text("something")
+        monkeypatch.setitem(meshio._helpers.reader_map, name.split(".")[1], reader)
+        with pytest.raises(FileFormatError):
+            read(tmp_path / name)
+
+    before = sys.stdout, sys.stderr, list(warnings.filters)
+    other = threading.Thread(target=lambda: (started.wait(10.0), attempt("a.vtk", second)))
+    other.start()
+    attempt("a.vtu", first)
+    done.set()
+    other.join()
+    after = sys.stdout, sys.stderr, list(warnings.filters)
+    sys.stdout, sys.stderr, warnings.filters[:] = before
+    assert after == before
 
 
 def test_tets_win_over_triangles_and_other_cells_are_named(solid, tmp_path):
