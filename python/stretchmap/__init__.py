@@ -18,6 +18,7 @@ if hasattr(os, "register_at_fork"):
 if TYPE_CHECKING:
     from . import energies as energies
     from . import errors as errors
+    from . import io as io
     from . import plot as plot
     from . import population as population
     from . import samples as samples
@@ -148,7 +149,7 @@ _EXPORTS = {
     "Morph": "plot.morphing",
     "morph": "plot.morphing",
 }
-_ROOMS = ("energies", "errors", "plot", "population", "samples")
+_ROOMS = ("energies", "errors", "io", "plot", "population", "samples")
 
 __all__ = ["__version__", *_EXPORTS, *_ROOMS]
 

@@ -45,6 +45,12 @@ def test_every_name_is_there_and_from_where_it_says(name):
         assert found.__module__ == f"stretchmap.{stretchmap._EXPORTS[name]}"
 
 
+def test_files_are_read_by_a_process_that_has_done_nothing_else():
+    code = "import stretchmap as sm; sm.io.read_arrays"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+
+
 def test_other_names_are_errors():
     with pytest.raises(AttributeError, match="volum_map"):
         _ = stretchmap.volum_map
