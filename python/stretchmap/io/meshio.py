@@ -2,20 +2,21 @@
 
 meshio exits the interpreter on some bad files, prints, leaves out cells a format cannot hold, and
 returns arrays in the file's byte order. Here its readers are called by format and never by
-guesswork, every way out of them becomes an exception, its output is caught, and cells that
-stretchmap cannot use are named.
+guesswork, every way out of them becomes an exception, what they print goes to the log, and cells
+that stretchmap cannot use are named. Nothing of the process is changed meanwhile: other threads
+print, warn and read files as ever.
 """
 
 from __future__ import annotations
 
 import contextlib
-import io
 import logging
 import mmap
 import re
 import threading
 import warnings
 from collections.abc import Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,11 @@ from .arrays import MeshArrays
 from .cells import Block, simplices
 
 _log = logging.getLogger("stretchmap")
-# Standard output and the filters of warnings belong to the process: who restores them last would
-# restore what another thread has put there.
-_one_at_a_time = threading.Lock()
+# Whether meshio works for us, and not for the user, in the thread at hand.
+_ours: ContextVar[bool] = ContextVar("ours", default=False)
+# NumPy 2.4 raises where the text of a file ends too early; before it only warned.
+_NUMPY_RAISES = np.lib.NumpyVersion(np.__version__) >= "2.4.0"
+_filters = threading.Lock()  # of warnings: there is one list of them for all threads
 
 # Number of cells in the text of a file.
 _ANNOUNCED = {
@@ -68,7 +71,7 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     blocks = []
     for b, block in enumerate(mesh.cells):
         data = {name: _native(parts[b]) for name, parts in mesh.cell_data.items()}
-        blocks.append(Block(block.type, np.asarray(block.data), data))
+        blocks.append(Block(block.type, _ids(block.data), data))
     point_data = {name: _native(array) for name, array in mesh.point_data.items()}
     return simplices(np.asarray(mesh.points), blocks, point_data)
 
@@ -113,6 +116,18 @@ def _plain(array: NDArray[Any]) -> NDArray[Any]:
     return array.astype(np.uint8) if array.dtype.kind == "b" else array
 
 
+def _ids(cells: Any) -> NDArray[Any]:
+    """Vertex ids as integers; meshio makes floats of unsigned ones, all of them whole."""
+    ids: NDArray[Any] = np.asarray(cells)
+    if ids.dtype.kind != "f":
+        return ids
+    with np.errstate(invalid="ignore"):
+        whole = ids.astype(np.int64)
+    if (whole != ids).any():
+        raise FileFormatError("cells name points by fractions")
+    return whole
+
+
 def _import(task: str) -> Any:
     try:
         import meshio
@@ -120,22 +135,33 @@ def _import(task: str) -> Any:
         raise MissingDependencyError(
             f"{task} needs meshio: pip install 'stretchmap[io]'"
         ) from error
+    common = meshio._common
+    if not isinstance(common.Console, _Console):
+        common.Console = _Console(common.Console)
     return meshio
+
+
+class _Console:
+    """What meshio prints by: the log where it works for us, else what it has printed by so far."""
+
+    def __init__(self, other: Any) -> None:
+        self._other = other
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        return _Log() if _ours.get() else self._other(*args, **options)
+
+
+class _Log:
+    def print(self, text: str, **_: Any) -> None:
+        _log.debug("meshio: %s", re.sub(r"\[/?[a-z]+\]", "", text))
 
 
 @contextlib.contextmanager
 def _guarded(path: Path, system: tuple[type[Exception], ...] = ()) -> Iterator[None]:
-    """Catch what meshio prints and every way it fails, but for what is no fault of the file."""
-    output = io.StringIO()
+    """Log what meshio prints; catch every way it fails, but for what is no fault of the file."""
+    mark = _ours.set(True)
     try:
-        with (
-            _one_at_a_time,
-            contextlib.redirect_stdout(output),
-            contextlib.redirect_stderr(output),
-            warnings.catch_warnings(),
-        ):
-            warnings.simplefilter("ignore")
-            warnings.filterwarnings("error", message=".*could not be read to its end.*")
+        with np.errstate(all="ignore"), _to_the_end():
             yield
     except ModuleNotFoundError as error:
         raise MissingDependencyError(
@@ -147,5 +173,15 @@ def _guarded(path: Path, system: tuple[type[Exception], ...] = ()) -> Iterator[N
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(reason) from error
     finally:
-        if output.getvalue().strip():
-            _log.debug("meshio on %s: %s", path, output.getvalue().strip())
+        _ours.reset(mark)
+
+
+@contextlib.contextmanager
+def _to_the_end() -> Iterator[None]:
+    """Have NumPy raise where the text of a file ends too early."""
+    if _NUMPY_RAISES:
+        yield
+        return
+    with _filters, warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*could not be read to its end.*")
+        yield

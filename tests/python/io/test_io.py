@@ -240,6 +240,52 @@ def test_files_read_in_two_threads_leave_standard_output_and_warnings_alone(tmp_
     assert after == before
 
 
+def test_what_meshio_prints_is_logged_and_what_others_print_is_printed(
+    tmp_path, monkeypatch, capsys, caplog
+):
+    meshio = pytest.importorskip("meshio")
+
+    def reader(path):
+        meshio._common.warn("ours")
+        other = threading.Thread(target=lambda: (print("theirs"), meshio._common.warn("their own")))
+        other.start()
+        other.join()
+        raise ValueError
+
+    monkeypatch.setitem(meshio._helpers.reader_map, "vtu", reader)
+    (tmp_path / "a.vtu").write_text("something")
+    with caplog.at_level(logging.DEBUG, logger="stretchmap"), pytest.raises(FileFormatError):
+        read(tmp_path / "a.vtu")
+    printed = capsys.readouterr()
+    assert printed.out == "theirs\n"
+    assert "their own" in printed.err and "ours" not in printed.err
+    assert "meshio: Warning: ours" in caplog.text
+
+
+UNSIGNED = """<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian">
+<UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="1">
+<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">
+0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
+<Cells><DataArray type="UInt64" Name="connectivity" format="ascii">0 1 2 3</DataArray>
+<DataArray type="UInt64" Name="offsets" format="ascii">4</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells>
+</Piece></UnstructuredGrid></VTKFile>
+"""
+
+
+def test_vertex_ids_of_any_type_are_read(tmp_path):
+    pytest.importorskip("meshio")
+    path = tmp_path / "a.vtu"
+    path.write_text(UNSIGNED)
+    assert read_arrays(path).T.tolist() == [[0, 1, 2, 3]]
+    assert read(path).n_tets == 1
+    path.write_text(
+        UNSIGNED.replace('"UInt64" Name="c', '"Float64" Name="c').replace("2 3<", "2.5 3<")
+    )
+    with pytest.raises(FileFormatError, match="by fractions"):
+        read(path)
+
+
 def test_tets_win_over_triangles_and_other_cells_are_named(solid, tmp_path):
     meshio = pytest.importorskip("meshio")
     triangles = solid.boundary_vertices[solid.surface.F]
