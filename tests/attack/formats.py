@@ -178,10 +178,10 @@ def _read_mesh(path: Path) -> Any:
 
 
 def _read_mask(path: Path) -> Any:
-    mask, spacing = read_mask(path)
+    mask, affine = read_mask(path)
     if mask.size > 10**6:
         raise RuntimeError("a mask larger than its file")
-    return sm.TriMesh(*mask_surface(mask, spacing or (1.0, 1.0, 1.0))[:2])
+    return sm.TriMesh(*mask_surface(mask, np.eye(4) if affine is None else affine)[:2])
 
 
 def _read_numbers(path: Path) -> Any:

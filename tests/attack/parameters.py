@@ -51,6 +51,7 @@ PARAMETERS: dict[str, Parameter] = {
     "max_cut": ("share", value(0.25)),
     "filler": ("word", value("auto")),
     "spacing": ("array", value((1.0, 1.0, 1.0))),
+    "prepare.affine": ("array?", value(None)),
     # populations
     "solids": ("object", lambda s: s.bones),
     "population": ("object", lambda s: s.population),

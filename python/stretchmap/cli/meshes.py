@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from . import common
 from .common import Compact, Input, Json, Orient, Output, Quiet
 from .guard import in_words_of_the_command_line
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class Filler(str, Enum):
@@ -165,10 +169,11 @@ def prepare(
     common.check_outputs(output, io.suffixes(solid=True), json, raw)
     common.require_package("gpytoolbox", "remeshing", "prepare")
     given: Any
-    steps = spacing
+    affine = None
     if holds_mask(raw):
-        given, found = read_mask(raw)
-        steps = spacing or found
+        given, affine = read_mask(raw)
+        if spacing is not None and affine is not None:
+            _require_spacing(affine, spacing, raw)
     else:
         mesh = common.read_mesh(raw)
         if isinstance(mesh, TetMesh):
@@ -177,12 +182,36 @@ def prepare(
     with terminal(quiet) as bar:
         done = prepare_surface(
             given, faces=faces, genus=genus, max_cut=max_cut, progress=bar,
-            spacing=steps or (1.0, 1.0, 1.0), filler=filler.value,
+            spacing=spacing if spacing and affine is None else (1.0, 1.0, 1.0), affine=affine,
+            filler=filler.value,
         )  # fmt: skip
     common.write_together(output, done.save, json, done.to_dict())
     if not quiet:
         typer.echo(done.summary())
         typer.echo(f"written to {output}")
+
+
+def _require_spacing(
+    affine: NDArray[np.float64], spacing: tuple[float, float, float], path: Path
+) -> None:
+    """Refuse a spacing other than that of the file.
+
+    Raises
+    ------
+    OptionError
+        It is another.
+    """
+    import numpy as np
+
+    from ..errors import OptionError
+
+    found = np.linalg.norm(affine[:3, :3], axis=0)
+    if not np.allclose(found, spacing, rtol=1e-5):
+        x, y, z = found
+        raise OptionError(
+            f"{path} says that voxels are {x:.6g} {y:.6g} {z:.6g} apart: leave out --spacing, and "
+            "where the file is wrong correct it, or save the mask as .npy"
+        )
 
 
 def tet(

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import options
 from ..base.arrays import as_reals
@@ -31,7 +31,7 @@ from .holes import close_holes, crossings, remove_crossings
 from .rebuild import rebuilt
 from .report import Preparation, Step
 from .soup import Faces, Points, keep_largest, part_sheets, weld
-from .voxels import mask_surface
+from .voxels import as_affine, mask_surface
 from .wild import chosen_filler, fill_within_envelope, has_ftetwild
 
 __all__ = ["prepare"]
@@ -56,6 +56,7 @@ def prepare(
     genus: int = 1,
     max_cut: float = 0.25,
     spacing: Sequence[float] = (1.0, 1.0, 1.0),
+    affine: ArrayLike | None = None,
     filler: Literal["auto", "tetgen", "ftetwild"] = "auto",
     progress: Progress | None = None,
 ) -> Preparation:
@@ -79,7 +80,12 @@ def prepare(
         Longest loop a handle may be cut along, as a share of the square root of the area of the
         surface. What is longer is taken for part of the shape.
     spacing : three floats
-        Distance of voxels along each axis of a mask.
+        Distance of voxels along each axis of a mask: voxel (i, j, k) lies at
+        ``(i, j, k) * spacing``.
+    affine : (4, 4) array_like, optional
+        Instead of ``spacing``, where images have one: voxel (i, j, k) lies at
+        ``affine @ (i, j, k, 1)``. However the image is stored, mirrored or oblique, the solid is
+        the one in world coordinates.
     filler : {"auto", "tetgen", "ftetwild"}
         What fills with tets: TetGen (package tetgen, AGPL) keeps the even surface as it is,
         fTetWild (package pytetwild, MPL 2.0) stays within 1 / 2000 of the size of it. By
@@ -96,8 +102,8 @@ def prepare(
     ------
     OptionError
         An option out of range.
-    KindError, ArrayError
-        Neither a surface nor a mask.
+    KindError, ArrayError, NonFiniteError
+        Neither a surface nor a mask, or an affine that is singular or none.
     ConnectivityError
         Two pieces too large to be debris.
     GenusError
@@ -126,13 +132,20 @@ def prepare(
     steps = as_reals(spacing, "spacing", (3,))
     if (steps <= 0.0).any():
         raise OptionError(f"spacing must be three positive numbers, got {steps.tolist()}")
+    matrix = np.diag([*steps, 1.0])
+    if affine is not None:
+        matrix = as_affine(affine)
+        if (steps != 1.0).any():
+            raise OptionError("spacing is part of the affine; pass one of the two")
     run = _Run(progress, chosen_filler(filler), filler == "auto" and has_ftetwild())
     if isinstance(surface, np.ndarray):
-        V, F = run.arrays("mask", mask_surface, surface, steps)
+        V, F = run.arrays("mask", mask_surface, surface, matrix)
     else:
         raw = as_surface(surface)
-        if (steps != 1.0).any():
-            raise OptionError("spacing is that of the voxels of a mask, a surface has none")
+        if affine is not None or (steps != 1.0).any():
+            raise OptionError(
+                "spacing and affine are those of the voxels of a mask, a surface has none"
+            )
         V, F = raw.V, raw.F
     V, F = run.arrays("weld", weld, V, F, _WELD * float(np.ptp(V, axis=0).max()))
     if not len(F):

@@ -46,8 +46,10 @@ def rebuilt(surface: TriMesh, step: float) -> TriMesh:
     mask, corner = winding_mask(surface.V, surface.F, step)
     if not mask.any():
         raise SelfIntersectionError("the surface crosses itself and winds round nothing", [])
-    V, F, _ = mask_surface(mask, (step, step, step))
-    V, F, _ = part_sheets(V + corner, F)
+    affine = np.diag([step, step, step, 1.0])
+    affine[:3, 3] = corner
+    V, F, _ = mask_surface(mask, affine)
+    V, F, _ = part_sheets(V, F)
     V, F, _ = keep_largest(V, F)
     return TriMesh(V, F, orient=True)
 

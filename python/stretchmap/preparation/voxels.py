@@ -5,39 +5,70 @@ from __future__ import annotations
 import importlib.util
 import os
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
+from ..base.arrays import as_reals
 from ..base.files import open_to_read, parsing
 from ..base.options import as_path
-from ..errors import ArrayError, FileFormatError, MissingDependencyError
+from ..errors import ArrayError, FileFormatError, MeshError, MissingDependencyError
 from ..io.npz import read_archive, read_array
 
-__all__ = ["holds_mask", "mask_surface", "read_mask"]
+__all__ = ["as_affine", "holds_mask", "mask_surface", "read_mask"]
 
 _BLUR = 0.7  # voxels; takes the stairs off, moves a flat surface nowhere
+_FLAT = 1e-6  # volume of a voxel over the product of its sides
+
+
+def as_affine(affine: ArrayLike, name: str = "affine") -> NDArray[np.float64]:
+    """Convert what takes indices of voxels to world coordinates.
+
+    Parameters
+    ----------
+    affine : (4, 4) array_like of real numbers
+    name : str
+        What the caller names it, for messages.
+
+    Returns
+    -------
+    (4, 4) ndarray of float64
+
+    Raises
+    ------
+    ArrayError, NonFiniteError
+        Not such a matrix, its last row is not 0, 0, 0, 1, or it lays voxels flat.
+    """
+    matrix = as_reals(affine, name, (4, 4))
+    if (matrix[3] != (0.0, 0.0, 0.0, 1.0)).any():
+        raise ArrayError(f"the last row of {name} must be 0, 0, 0, 1, not {matrix[3].tolist()}")
+    sides = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not (sides > 0.0).all() or abs(np.linalg.det(matrix[:3, :3] / sides)) < _FLAT:
+        raise ArrayError(
+            f"{name} is singular, voxels have no volume: {matrix[:3, :3].tolist()}; correct it "
+            "where it comes from"
+        )
+    return matrix
 
 
 def mask_surface(
-    mask: NDArray[Any], spacing: Sequence[float]
+    mask: NDArray[Any], affine: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], dict[str, int]]:
     """Surface of the largest island of a mask, its cavities filled.
 
     Parameters
     ----------
     mask : (a, b, c) array of bool, or of integers of which those that are not zero belong to it
-    spacing : three positive floats
-        Distance of voxel centers along each axis.
+    affine : (4, 4) array
+        The center of voxel (i, j, k) lies at ``affine @ (i, j, k, 1)``; regular.
 
     Returns
     -------
     V, F : ndarrays
-        Marching cubes on the smoothed mask; voxel (i, j, k) lies at ``(i, j, k) * spacing``.
+        Marching cubes on the smoothed mask; all faces oriented alike, either way.
     counts : dict
         Voxels of ``islands`` dropped, of ``cavities`` filled, ``faces``.
 
@@ -48,11 +79,11 @@ def mask_surface(
     MissingDependencyError
         If scikit-image is not installed.
     """
-    mask = np.asarray(mask)
-    if mask.ndim != 3 or mask.dtype.kind not in "biu":
+    mask = _one_volume(np.asarray(mask))
+    if mask.dtype.kind not in "biu":
         raise ArrayError(
-            f"a mask is a 3-dimensional array of bool or integers, not {mask.dtype} of shape "
-            f"{mask.shape}; make one by a threshold, volume > level"
+            f"a mask holds bool or integers, not {mask.dtype}; make one by a threshold, "
+            "volume > level"
         )
     if not mask.any():
         raise ArrayError("the mask is empty")
@@ -75,8 +106,18 @@ def mask_surface(
         "cavity_voxels_filled": int(filled.sum() - sizes.max()),
         "faces": len(F),
     }
-    V = (V + np.array([axis.start for axis in box]) - 3) * np.asarray(spacing, float)
-    return V, np.ascontiguousarray(F, np.int32), counts
+    V = V + np.array([axis.start for axis in box]) - 3
+    return V @ affine[:3, :3].T + affine[:3, 3], np.ascontiguousarray(F, np.int32), counts
+
+
+def _one_volume(array: NDArray[Any]) -> NDArray[Any]:
+    """The array without trailing axes of length one, as images have for time and channels."""
+    while array.ndim > 3 and array.shape[-1] == 1:
+        array = array[..., 0]
+    if array.ndim != 3:
+        more = "; choose one of its volumes, image[..., 0]" if array.ndim > 3 else ""
+        raise ArrayError(f"a mask has three axes, this has the shape {array.shape}{more}")
+    return array
 
 
 def holds_mask(path: str | os.PathLike[str]) -> bool:
@@ -99,7 +140,7 @@ def holds_mask(path: str | os.PathLike[str]) -> bool:
 
 def read_mask(
     path: str | os.PathLike[str],
-) -> tuple[NDArray[Any], tuple[float, float, float] | None]:
+) -> tuple[NDArray[Any], NDArray[np.float64] | None]:
     """Read a voxel mask.
 
     Parameters
@@ -111,7 +152,9 @@ def read_mask(
     Returns
     -------
     mask : (a, b, c) ndarray
-    spacing : three floats, or None where the file names none
+    affine : (4, 4) ndarray, or None
+        From indices to world coordinates, in the unit of the file; that of a spacing is diagonal.
+        None where the file says nothing of either.
 
     Raises
     ------
@@ -135,12 +178,13 @@ def read_mask(
     spacing = arrays.get("spacing")
     if spacing is None:
         return arrays[masks[0]], None
-    if spacing.shape != (3,) or spacing.dtype.kind not in "fiu":
-        raise FileFormatError(f"{path}: spacing must be three numbers")
-    return arrays[masks[0]], tuple(spacing.astype(float).tolist())
+    known = spacing.shape == (3,) and spacing.dtype.kind in "fiu"
+    if not known or not (np.isfinite(spacing) & (spacing > 0.0)).all():
+        raise FileFormatError(f"{path}: spacing must be three positive numbers")
+    return arrays[masks[0]], np.diag([*spacing.astype(float), 1.0])
 
 
-def _read_nifti(path: str | os.PathLike[str]) -> tuple[NDArray[Any], Any]:
+def _read_nifti(path: Path) -> tuple[NDArray[Any], NDArray[np.float64]]:
     try:
         import nibabel
     except ImportError as error:
@@ -148,7 +192,14 @@ def _read_nifti(path: str | os.PathLike[str]) -> tuple[NDArray[Any], Any]:
             "NIfTI files need nibabel: pip install 'stretchmap[nifti]'"
         ) from error
     image: Any = nibabel.load(path)
-    data = np.asarray(image.dataobj)
+    header = image.header
+    try:
+        data = _one_volume(np.asarray(image.dataobj))
+        # Without a form the standard has voxels at their distances; nibabel would mirror them.
+        placed = header.get_sform(coded=True)[1] or header.get_qform(coded=True)[1]
+        affine = as_affine(image.affine if placed else np.diag([*header.get_zooms()[:3], 1.0]))
+    except MeshError as error:
+        raise FileFormatError(str(error)) from None
     if data.dtype.kind == "f" and np.array_equal(data, np.rint(data)):
         data = data.astype(np.int64)  # integers with a scale of one are stored so
-    return data, tuple(float(step) for step in image.header.get_zooms()[:3])
+    return data, affine

@@ -1,0 +1,139 @@
+"""Masks of images become surfaces where the images say they are, however these are stored."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.spatial
+
+pytest.importorskip("skimage", reason="masks need scikit-image")
+
+import stretchmap as sm
+from stretchmap import samples
+from stretchmap.cli import main
+from stretchmap.errors import ArrayError, FileFormatError, MeshError, OptionError
+from stretchmap.preparation.voxels import mask_surface, read_mask
+
+OBLIQUE = np.array(
+    [[0.5, 0.1, 0.0, -40.0], [-0.1, 0.7, 0.3, 15.0], [0.2, 0.0, 2.0, 7.0], [0.0, 0.0, 0.0, 1.0]]
+)
+
+
+def lopsided_mask() -> np.ndarray:
+    """A ring that is none of its mirror images."""
+    mask = np.zeros((16, 14, 8), np.uint8)
+    mask[2:14, 2:12, 2:6] = 1
+    mask[5:10, 5:9] = 0
+    mask[2:5, 2:4, 6] = 1
+    return mask
+
+
+def stored(mask: np.ndarray, affine: np.ndarray, axes: tuple, flips: tuple) -> tuple:
+    """The same image with its axes in another order and direction."""
+    change = np.eye(4)[:, [*axes, 3]]
+    for axis in flips:
+        flip = np.eye(4)
+        flip[axis, axis], flip[axis, 3] = -1.0, mask.shape[axes[axis]] - 1.0
+        change = change @ flip
+    return np.flip(mask.transpose(axes), flips), affine @ change
+
+
+@pytest.mark.parametrize(
+    ("axes", "flips"), [((0, 1, 2), (0,)), ((0, 1, 2), (0, 1, 2)), ((2, 0, 1), ()), ((1, 0, 2), ())]
+)
+def test_a_mask_is_where_its_affine_puts_it_however_it_is_stored(axes, flips):
+    mask = lopsided_mask()
+    V, F, _ = mask_surface(mask, OBLIQUE)
+    inside = np.argwhere(mask) @ OBLIQUE[:3, :3].T + OBLIQUE[:3, 3]
+    np.testing.assert_allclose(V.mean(axis=0), inside.mean(axis=0), atol=0.3)
+    surface = sm.TriMesh(V, F, orient=True)
+    V, F, _ = mask_surface(*stored(mask, OBLIQUE, axes, flips))
+    again = sm.TriMesh(V, F, orient=True)
+    assert again.volume == pytest.approx(surface.volume, rel=1e-3)
+    distances, _ = scipy.spatial.KDTree(V).query(surface.V)
+    assert distances.max() < 1e-4  # single precision
+    again.require_genus_one()
+
+
+@pytest.mark.parametrize(
+    ("affine", "match"),
+    [
+        (np.diag([1.0, 1.0, 0.0, 1.0]), "singular"),
+        (np.array([[1, 1, 0, 0], [1, 1 + 1e-9, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]), "singular"),
+        (np.diag([1.0, 1.0, 1.0, 2.0]), "last row"),
+        (np.eye(3), "shape"),
+        (np.diag([1.0, np.nan, 1.0, 1.0]), "NaN"),
+    ],
+)
+def test_what_places_no_voxels_is_refused(affine, match):
+    with pytest.raises(MeshError, match=match):
+        sm.prepare(lopsided_mask(), affine=affine)
+
+
+def test_a_spacing_beside_an_affine_is_refused():
+    with pytest.raises(OptionError, match="one of the two"):
+        sm.prepare(lopsided_mask(), affine=OBLIQUE, spacing=(1.0, 1.0, 2.0))
+    with pytest.raises(OptionError, match="a surface has none"):
+        sm.prepare(samples.torus_surface(20, 10), affine=OBLIQUE)
+
+
+def test_a_solid_is_where_the_affine_puts_its_mask():
+    mask = lopsided_mask()
+    mirrored = OBLIQUE @ np.diag([-1.0, 1.0, 1.0, 1.0])
+    solid = sm.prepare(mask, faces=600, affine=mirrored).solid
+    inside = np.argwhere(mask) @ mirrored[:3, :3].T + mirrored[:3, 3]
+    np.testing.assert_allclose(solid.V.mean(axis=0), inside.mean(axis=0), atol=0.5)
+    assert (solid.tet_volumes > 0.0).all()
+
+
+def test_nifti_is_read_with_its_affine(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    mask, path = lopsided_mask(), tmp_path / "mask.nii.gz"
+    zooms = np.diag([0.5, 0.7, 2.0, 1.0])
+    for affine in (zooms, np.diag([-1.0, 1.0, 1.0, 1.0]), OBLIQUE):
+        nibabel.save(nibabel.Nifti1Image(mask, affine), path)
+        found, placed = read_mask(path)
+        np.testing.assert_array_equal(found, mask)
+        np.testing.assert_allclose(placed, affine, rtol=1e-6)
+    image = nibabel.Nifti1Image(mask, None)
+    image.header.set_zooms((0.5, 0.7, 2.0))
+    nibabel.save(image, path)
+    np.testing.assert_allclose(read_mask(path)[1], zooms, rtol=1e-6)
+    image = nibabel.Nifti1Image(mask, np.eye(4))
+    image.set_sform(np.diag([1.0, 1.0, 0.0, 1.0]), 1)
+    nibabel.save(image, path)
+    with pytest.raises(FileFormatError, match=r"mask\.nii\.gz.*singular"):
+        read_mask(path)
+
+
+def test_one_volume_of_an_image_is_taken_and_more_are_refused(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    path = tmp_path / "mask.nii"
+    for data, match in (
+        (lopsided_mask()[..., None], ""),
+        (np.stack([lopsided_mask()] * 2, axis=-1), r"image\[\.\.\., 0\]"),
+        (lopsided_mask()[..., 0], "three axes"),
+    ):
+        nibabel.save(nibabel.Nifti1Image(data, np.eye(4)), path)
+        if match:
+            with pytest.raises(FileFormatError, match=match):
+                read_mask(path)
+        else:
+            assert read_mask(path)[0].shape == data.shape[:3]
+
+
+def test_the_command_refuses_a_spacing_that_contradicts_the_file(tmp_path, capsys):
+    np.savez(tmp_path / "mask.npz", mask=lopsided_mask(), spacing=[0.5, 0.5, 1.0])
+    arguments = ["prepare", str(tmp_path / "mask.npz"), "-o", str(tmp_path / "solid.npz"), "-q"]
+    arguments += ["--faces", "600", "--spacing", "0.5", "0.5"]
+    assert main([*arguments, "2"]) == 2
+    assert "0.5 0.5 1 apart" in capsys.readouterr().err
+    assert main([*arguments, "1"]) == 0
+
+
+def test_a_mask_of_several_volumes_is_refused():
+    several = np.stack([lopsided_mask()] * 2, axis=-1)
+    with pytest.raises(ArrayError, match=r"choose one of its volumes"):
+        sm.prepare(several)
+    V, _, _ = mask_surface(several[..., :1], np.eye(4))
+    assert len(V)
