@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -167,7 +168,8 @@ def field_statistics(
         As in `carry_field`.
     group : mapping from names to one of two labels, optional
         Compare two groups, the first in sorted order minus the second, by Welch's test, which does
-        not take variances to be equal. Without it the mean is compared with ``against``.
+        not take variances to be equal. Labels are all numbers, sorted as such, or all text.
+        Without it the mean is compared with ``against``.
     against : float
 
     Returns
@@ -179,7 +181,8 @@ def field_statistics(
     OptionError
         An unknown shape, or an option out of range.
     ArrayError
-        Fewer than two shapes of a group, more than two groups, or fields of other shapes.
+        Fewer than two shapes of a group, more than two groups, labels of several kinds, or fields
+        of other shapes.
     MissingDependencyError
         SciPy is older than 1.11.
 
@@ -230,11 +233,18 @@ def _sides(
     """All values, or those of two groups."""
     if group is None:
         return [values]
-    missing = [name for name in names if name not in group]
+    given = [group.get(name, math.nan) for name in names]
+    try:  # what is not equal to itself is NaN, which tables have for no label
+        missing = [n for n, label in zip(names, given, strict=True) if label != label]
+        labels = sorted(set(given)) if not missing else []
+    except (TypeError, ValueError):
+        kinds = sorted({type(label).__name__ for label in given})
+        raise ArrayError(
+            f"group: labels must be all numbers or all text, got {' and '.join(kinds)}"
+        ) from None
     if missing:
         raise ArrayError(f"group: no label of {', '.join(missing[:5])}")
-    labels = sorted({str(group[name]) for name in names})
-    sides = [values[[str(group[name]) == label for name in names]] for label in labels]
+    sides = [values[[label == each for each in given]] for label in labels]
     if len(sides) != 2 or min(map(len, sides)) < 2:
         sizes = ", ".join(f"{k}: {len(s)}" for k, s in zip(labels, sides, strict=True))
         raise ArrayError(f"two groups of two shapes or more can be compared, got {sizes}")

@@ -83,6 +83,28 @@ def test_a_difference_of_groups_is_found_where_it_is(bones, found):
     assert (changed.p_adjusted >= changed.p).all()
 
 
+def test_groups_are_sorted_as_what_their_labels_are(bones, found):
+    given = fields(bones, found, 0.5)
+
+    def t(first, second):
+        group = {name: second if int(name) >= 3 else first for name in found.names}
+        return sm.population.field_statistics(found, given, conserve="value", group=group).t
+
+    wanted = t("a", "b")
+    for first, second in ((9, 10), (np.int64(-1), 0.5), ("10", "9")):
+        np.testing.assert_array_equal(t(first, second), wanted)
+        np.testing.assert_array_equal(t(second, first), -wanted)
+
+
+@pytest.mark.parametrize(
+    "labels", [(1, "1"), (None, "a"), ([1], [2]), (np.ones(2), 1), (np.nan, 1)]
+)
+def test_labels_that_cannot_be_sorted_are_refused(bones, found, labels):
+    group = {name: labels[int(name) >= 3] for name in found.names}
+    with pytest.raises(ArrayError, match=r"labels must be all numbers or all text|no label of 0"):
+        sm.population.field_statistics(found, fields(bones, found), group=group)
+
+
 def test_a_field_that_does_not_vary_has_no_t(bones, found):
     ones = {name: np.ones(bones.solids[int(name)].n_vertices) for name in found.names}
     statistics = sm.population.field_statistics(found, ones, conserve="value", against=1.0)
