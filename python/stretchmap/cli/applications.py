@@ -83,6 +83,7 @@ def register_solids(
     common.check_outputs(output, common.map_suffixes(), json, *inputs)
     watch = common.Stopwatch()
     source, fields = _solid_torus(input, orient, compact)
+    fields = common.check_fields(output, source, fields)
     goal, _ = _solid_torus(target, orient, compact)
     marks = None if landmarks is None else read_landmarks(landmarks, source, goal, within=within)
     watch.lap("read")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import FileFormatError, MeshError, MissingDependencyError, OptionError
+from ..errors import ArrayError, FileFormatError, MeshError, MissingDependencyError, OptionError
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TetMesh, TriMesh
@@ -122,6 +122,25 @@ def surface_with_fields(mesh: TriMesh | TetMesh, fields: Fields) -> tuple[TriMes
         return surface, fields
     ids = mesh.boundary_vertices
     return surface, ({name: array[ids] for name, array in fields[0].items()}, {})
+
+
+def check_fields(output: Path, mesh: TriMesh | TetMesh, fields: Fields) -> Fields:
+    """The fields a map of the mesh carries, if its file can hold them: :func:`check_output`.
+
+    Raises
+    ------
+    ArrayError
+        It cannot.
+    """
+    from ..maps.fields import carried
+    from ..maps.writing import require_storable
+
+    own = carried(mesh, None, *fields)
+    try:
+        require_storable(output, *own)
+    except ArrayError as error:
+        raise ArrayError(f"{output}: {error}") from error
+    return own
 
 
 def require_solid(mesh: TriMesh | TetMesh, path: Path, command: str) -> TetMesh:

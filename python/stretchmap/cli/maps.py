@@ -49,6 +49,7 @@ def conformal(
     watch = common.Stopwatch()
     mesh, fields = common.read_with_fields(input, orient, compact)
     surface, fields = common.surface_with_fields(mesh, fields)
+    fields = common.check_fields(output, surface, fields)
     watch.lap("read")
     with use_threads(threads):
         result = conformal_map(surface)
@@ -99,6 +100,7 @@ def area(
     options = {name: value for name, value in options.items() if value is not None}
     mesh, fields = common.read_with_fields(input, orient, compact)
     surface, fields = common.surface_with_fields(mesh, fields)
+    fields = common.check_fields(output, surface, fields)
     watch.lap("read")
     with terminal(quiet) as bar:
         result = area_map(surface, **options, refine=refine, threads=threads, progress=bar)

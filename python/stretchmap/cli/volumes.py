@@ -121,6 +121,7 @@ def volume(
         route["start"] = resumed(solid, load_map(start), start)
         solid = route["start"].mesh
         fields = route["start"].point_fields, route["start"].cell_fields
+    fields = common.check_fields(output, solid, fields)
     watch.lap("read")
     with terminal(quiet) as bar:
         result = volume_map(
@@ -171,6 +172,7 @@ def fill(
     watch = common.Stopwatch()
     mesh, fields = common.read_with_fields(input, orient, compact)
     solid = common.require_solid(mesh, input, "fill")
+    fields = common.check_fields(output, solid, fields)
     image = prescribed_image(solid, boundary)
     watch.lap("read")
     with terminal(quiet) as bar:

@@ -19,6 +19,8 @@ from collections.abc import Iterator
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote, unquote
+from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,7 @@ from numpy.typing import NDArray
 from ..errors import FileFormatError, MissingDependencyError
 from .arrays import MeshArrays
 from .cells import Block, simplices
+from .storable import GMSH_TAGS
 
 _log = logging.getLogger("stretchmap")
 # Whether meshio works for us, and not for the user, in the thread at hand.
@@ -39,6 +42,8 @@ _ANNOUNCED = {
     "vtk": rb"(?m)^CELL_TYPES[ \t]+(\d{1,18})\b",
     "vtu": rb"NumberOfCells=[\"'](\d{1,18})[\"']",
 }
+# Characters of names that VTK does not encode in its .vtk files.
+_PRINTED = "".join(chr(code) for code in range(33, 127) if chr(code) not in '"%')
 # What opens the list of points.
 _ONCE = {"medit": rb"(?m)^[ \t]*Vertices\b", "gmsh": rb"(?m)^\$Nodes\b"}
 
@@ -68,27 +73,48 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     with _guarded(path):
         mesh = meshio._helpers.reader_map[file_format](str(path))
     _require_all(path, file_format, sum(len(block.data) for block in mesh.cells))
+    read_as = unquote if file_format == "vtk" else str
     blocks = []
     for b, block in enumerate(mesh.cells):
-        data = {name: _native(parts[b]) for name, parts in mesh.cell_data.items()}
+        data = {read_as(name): _native(parts[b]) for name, parts in mesh.cell_data.items()}
         blocks.append(Block(block.type, _ids(block.data), data))
-    point_data = {name: _native(array) for name, array in mesh.point_data.items()}
+    point_data = {read_as(name): _native(array) for name, array in mesh.point_data.items()}
     return simplices(np.asarray(mesh.points), blocks, point_data)
 
 
 def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
-    """Write a mesh in one of meshio's formats."""
+    """Write a mesh, with data that the format can hold, in one of meshio's formats."""
     meshio = _import(f"writing {path.suffix} files")
     kind = "triangle" if mesh.T is None else "tetra"
     options: dict[str, Any] = {"data_format": "XML"} if file_format == "xdmf" else {}
+    cell_data = mesh.cell_data
+    if file_format == "gmsh" and not cell_data.keys().isdisjoint(GMSH_TAGS):
+        # Of version 4.1 meshio writes regions only where each has points of its own.
+        file_format, cell_data = "gmsh22", _with_both_tags(cell_data)
     with _guarded(path, (OSError, MemoryError)):
         out = meshio.Mesh(
             mesh.V,
             [(kind, mesh.elements)],
-            point_data={k: _plain(a) for k, a in mesh.point_data.items()},
-            cell_data={k: [_plain(a)] for k, a in mesh.cell_data.items()},
+            point_data={_written(file_format, k): a for k, a in mesh.point_data.items()},
+            cell_data={_written(file_format, k): [a] for k, a in cell_data.items()},
         )
         meshio._helpers._writer_map[file_format](str(path), out, **options)
+
+
+def _with_both_tags(cell_data: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The physical groups for the entities where these are not given, and the other way round:
+    Gmsh takes the elements of an entity together."""
+    tags = [cell_data[name].reshape(-1) for name in GMSH_TAGS if name in cell_data]
+    return {**cell_data, **dict(zip(GMSH_TAGS, (tags[0], tags[-1]), strict=True))}
+
+
+def _written(file_format: str, name: str) -> str:
+    """A name as it stands in a file, where meshio does not see to that."""
+    if file_format == "vtu":
+        return escape(name, {'"': "&quot;"}).encode("ascii", "xmlcharrefreplace").decode()
+    if file_format == "vtk":  # as VTK does
+        return "%4DETADATA" if name == "METADATA" else quote(name, _PRINTED)
+    return name
 
 
 def _require_all(path: Path, file_format: str, found: int) -> None:
@@ -110,10 +136,6 @@ def _native(array: Any) -> NDArray[Any]:
     """In the machine's byte order, not the file's."""
     found: NDArray[Any] = np.asarray(array)
     return found.astype(found.dtype.newbyteorder("="), copy=False)
-
-
-def _plain(array: NDArray[Any]) -> NDArray[Any]:
-    return array.astype(np.uint8) if array.dtype.kind == "b" else array
 
 
 def _ids(cells: Any) -> NDArray[Any]:

@@ -201,7 +201,8 @@ def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:
     Raises
     ------
     ArrayError
-        The name of an array is one that PLY has for the mesh, or not of ASCII characters.
+        The name of an array is one that PLY has for the mesh, that of another array once spaces
+        are underscores and columns have numbers, or not of ASCII characters.
     """
     columns, cells = _columns(mesh.point_data), _columns(mesh.cell_data)
     of_points, of_faces = set(_AXES), {"#", *_CORNERS}
@@ -234,14 +235,21 @@ def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:
 
 
 def _columns(data: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """One entry per column, of a type PLY knows; column k of a vector gets the suffix ``_k``."""
+    """One entry per column; column k of a vector gets the suffix ``_k``, and spaces underscores."""
     columns: dict[str, NDArray[Any]] = {}
+    whose: dict[str, str] = {}
     for name, array in data.items():
         word = "_".join(name.split())
-        if array.dtype.str[1:] not in _NAMES:
-            array = array.astype(np.uint8 if array.dtype.kind == "b" else np.float64)
         if array.ndim == 1:
-            columns[word] = array
+            own = {word: array}
         else:
-            columns |= {f"{word}_{k}": array[:, k] for k in range(array.shape[1])}
+            own = {f"{word}_{k}": array[:, k] for k in range(array.shape[1])}
+        for column in own:
+            if column in columns:
+                raise ArrayError(
+                    f"the arrays {shown(whose[column])} and {shown(name)} would both be {column} "
+                    "in .ply; rename one"
+                )
+            whose[column] = name
+        columns |= own
     return columns

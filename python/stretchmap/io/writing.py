@@ -27,6 +27,7 @@ from .obj import write_obj
 from .off import write_off
 from .ply import write_ply
 from .stl import write_stl
+from .storable import storable
 
 __all__ = ["write"]
 
@@ -56,7 +57,8 @@ def write(
         As for `read`. An existing file is replaced, but only once the new one is complete.
     mesh : TriMesh or TetMesh
     point_data, cell_data : mapping of str to (n,) or (n, d) array_like, optional
-        One row per vertex, or per face or tet. Formats without arrays leave them out.
+        One row per vertex, or per face or tet. Formats without arrays leave them out. Numbers of a
+        type that the format does not have are written as those of one that holds all their values.
     corner_uv : (m, 3, 2) array_like, optional
         Texture coordinates of the corners of the faces; ``.obj`` only. They may differ at one
         vertex (seam).
@@ -66,7 +68,8 @@ def write(
     FileFormatError
         Unknown suffix, or the format cannot hold tets or texture coordinates.
     ArrayError
-        An array with the wrong number of rows, not numeric, or named like a mesh array.
+        An array with the wrong number of rows, not numeric, named like a mesh array, or of a type,
+        a number of columns or a name that the format cannot hold.
     MissingDependencyError
         The format needs meshio and it is not installed.
     OSError
@@ -97,8 +100,8 @@ def write(
         mesh.V,
         F=None if solid else elements,
         T=elements if solid else None,
-        point_data=checked(point_data, len(mesh.V), "point_data"),
-        cell_data=checked(cell_data, len(elements), "cell_data"),
+        point_data=storable(suffix, checked(point_data, len(mesh.V), "point_data")),
+        cell_data=storable(suffix, checked(cell_data, len(elements), "cell_data")),
         corner_uv=checked_uv(corner_uv, suffix, elements),
     )
     if suffix in _WITHOUT_DATA and (arrays.point_data or arrays.cell_data):

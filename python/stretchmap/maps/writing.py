@@ -20,11 +20,15 @@ from .. import io
 from ..base.files import atomic_path
 from ..base.torus import TWO_PI, Torus
 from ..io.npz import save_npz
+from ..io.storable import storable
 from ..mesh.exchange import Cells
 from ..mesh.meshes import TetMesh, TriMesh
 from .frames import coordinate_field, periodic
 
-__all__ = ["all_fields", "corner_turns", "elements", "save_arrays", "write_map"]
+__all__ = ["all_fields", "corner_turns", "elements", "require_storable", "save_arrays", "write_map"]
+
+# Formats whose files of maps hold the source with all fields, beside those of ours.
+_WITH_FIELDS = (".vtu", ".vtk", ".xdmf")
 
 
 def write_map(
@@ -36,7 +40,7 @@ def write_map(
 ) -> None:
     """Write a map to a file that is none of ours, see `MapResult.save`."""
     suffix = path.suffix.lower()
-    if suffix in (".vtu", ".vtk", ".xdmf"):
+    if suffix in _WITH_FIELDS:
         io.write(path, mesh, point_data=given.point_data, cell_data=given.cell_data)
     elif isinstance(mesh, TetMesh):
         if suffix in io.suffixes(solid=True):
@@ -48,6 +52,19 @@ def write_map(
         io.write(path, mesh, corner_uv=corner_turns(mesh.F, angles))
     else:
         io.write(path, TriMesh(image, mesh.F), cell_data={"ratio": given.cell_data["ratio"]})
+
+
+def require_storable(path: Path, *fields: Mapping[str, NDArray[Any]]) -> None:
+    """Refuse fields of the source that the file of its map could not hold.
+
+    Raises
+    ------
+    ArrayError
+        Says what can be done.
+    """
+    suffix = path.suffix.lower()
+    for named in fields if suffix in _WITH_FIELDS else ():
+        storable(suffix, named)
 
 
 def save_arrays(

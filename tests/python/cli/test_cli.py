@@ -18,6 +18,7 @@ from stretchmap import TetMesh, TriMesh, samples
 from stretchmap.cli import GROUPS, main
 from stretchmap.cli.guard import guarded, in_words_of_the_command_line
 from stretchmap.errors import CertificationError
+from stretchmap.io import read_arrays
 
 pytest.importorskip("typer")
 
@@ -153,6 +154,31 @@ def test_fields_named_like_those_of_maps_are_left_out_with_a_word(folder, capsys
     said = capsys.readouterr().err
     assert "left out: u;" in said and "load" not in said
     assert "load" in sm.io.read_arrays("map.vtu").point_data
+
+
+def test_fields_the_output_has_other_types_for_are_carried(folder, capsys):
+    pytest.importorskip("meshio")
+    surface = sm.read("surface.ply")
+    labels = np.arange(surface.n_faces, dtype=np.uint8)
+    sm.write("labels.vtu", surface, cell_data={"my labels": labels})
+    for suffix in (".xdmf", ".vtk"):
+        assert main(["conformal", "labels.vtu", "-o", f"map{suffix}", "-q"]) == 0
+        np.testing.assert_array_equal(read_arrays(f"map{suffix}").cell_data["my labels"], labels)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("command", ["conformal", "area", "volume", "fill", "register"])
+def test_fields_the_output_cannot_hold_are_refused_before_the_work(command, folder, capsys):
+    pytest.importorskip("meshio")
+    solid = sm.read("solid.npz")
+    sm.write("four.npz", solid, point_data={"four": np.ones((solid.n_vertices, 4))})
+    np.savez("image.npz", ids=solid.boundary_vertices, image=solid.V[solid.boundary_vertices])
+    further = {"fill": ["--boundary", "image.npz"], "register": ["solid.npz"]}.get(command, [])
+    start = time.process_time()
+    code, error = failing(capsys, command, "four.npz", *further, "-o", "map.xdmf", "-q")
+    assert time.process_time() - start < 1.0
+    assert code == 2 and error.startswith("map.xdmf: 'four' has 4 columns")
+    assert ".vtu or .npz" in error
 
 
 def test_start_from_another_solids_map_is_refused(folder, capsys):
