@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 import os
 import tempfile
@@ -31,6 +30,7 @@ from .fitting import Anchors
 from .mean import certified_mean, movement
 from .procrustes import generalized_procrustes
 from .result import Population
+from .run_folder import prepare_folder
 from .shape_model import shape_model
 from .shapes import Shape, gather_landmarks, gather_shapes
 from .task import Job, Record, failed, run_job
@@ -78,8 +78,8 @@ def fit(
         under the name ``"template"``.
     folder : path, optional
         The run folder: a JSON record of every shape and round, a map of every shape. A run that was
-        stopped goes on where it was, with the same result. Without it the maps are kept in a
-        temporary folder and thrown away.
+        stopped goes on where it was, with the same result; shapes may be added. Without it the maps
+        are kept in a temporary folder and thrown away.
     executor : {"serial", "processes", "processes:N", "dask://host:port"}, client or object
         Where shapes are mapped. The result does not depend on it, to the last bit, unless a map
         runs short of time.
@@ -142,7 +142,7 @@ def fit(
                 f"the run folder {shown(str(folder))} is that of the shapes: what a run leaves "
                 "would be taken for shapes; name another one"
             )
-    solid, marks = _start(shapes, template, landmarks)
+    solid, marks, chosen = _start(shapes, template, landmarks)
     # Where all corners of a tet lie on the boundary only new vertices inside can keep it upright;
     # put in once they are in every map and in the mean.
     solid = refine_overconstrained(solid).solid
@@ -150,30 +150,33 @@ def fit(
         place = (
             Path(stack.enter_context(tempfile.TemporaryDirectory()))
             if folder is None
-            else as_path(folder)
+            else as_path(folder).absolute()
         )
-        _prepare(place, {"along": along, "scale": scale, "volume_weight": volume_weight})
+        settings = {"along": along, "scale": scale, "volume_weight": volume_weight}
+        prepare_folder(place, settings | {"template": chosen}, shapes)
         anchors = None if marks is None else Anchors.of(solid.surface, marks)
         run = _Run(place, shapes, workers, along, scale, volume_weight, progress)
         found = run.until_at_rest(solid, anchors, max_rounds, tol)
     return replace(found, folder=None) if folder is None else found
 
 
-def _start(shapes: list[Shape], template: Any, landmarks: Any) -> tuple[TetMesh, Array | None]:
-    """The first template and its landmarks."""
+def _start(
+    shapes: list[Shape], template: Any, landmarks: Any
+) -> tuple[TetMesh, Array | None, str | None]:
+    """The first template, its landmarks, and its digest unless it is the default."""
     if template is None:
         reasons = []
         for shape in shapes:
             try:
-                return shape.load(), shape.load_landmarks()
+                return shape.load(), shape.load_landmarks(), None
             except (StretchmapError, OSError) as error:
                 reasons.append(f"{shape.name}: {error}")
         raise SolverError(f"no shape can be read; {reasons[0]}")
     for shape in shapes:
         if isinstance(template, str) and shape.name == template:
-            return shape.load(), shape.load_landmarks()
+            return shape.load(), shape.load_landmarks(), shape.digest()
     if isinstance(template, (str, os.PathLike)):
-        path = as_path(template)
+        path = as_path(template).absolute()
         if not path.exists():
             raise OptionError(
                 f"template {str(template)!r} is neither the name of a shape "
@@ -190,30 +193,7 @@ def _start(shapes: list[Shape], template: Any, landmarks: Any) -> tuple[TetMesh,
                 f"or a folder with those of {_TEMPLATE!r}"
             )
         (own,) = gather_landmarks([own], landmarks)
-    return own.load(), own.load_landmarks()
-
-
-def _prepare(folder: Path, settings: dict[str, Any]) -> None:
-    """Make the run folder, or check that it is of such a run.
-
-    Raises
-    ------
-    OptionError
-        It is that of a run with other settings.
-    """
-    for name in ("maps", "images", "records"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    path = folder / "run.json"
-    if path.exists():
-        try:
-            before = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError:
-            before = None
-        if before != settings:
-            raise OptionError(f"{folder} holds a run with other settings, {before}; take another")
-        return
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(settings, indent=1), encoding="utf-8")
+    return own.load(), own.load_landmarks(), own.digest()
 
 
 @dataclass

@@ -72,6 +72,11 @@ class Shape:
             return read_numbers(self.landmarks, {3: "x, y, z"})
         return self.landmarks
 
+    def is_there(self) -> bool:
+        """Whether the files it is read from are."""
+        files = (part for part in (self.source, self.landmarks) if isinstance(part, Path))
+        return all(os.path.isfile(file) for file in files)
+
     def digest(self) -> str:
         """Changes when what the shape is made of does."""
         found = hashlib.sha256(self.name.encode())
@@ -151,7 +156,7 @@ def gather_landmarks(shapes: list[Shape], landmarks: Any) -> list[Shape]:
         return shapes
     marks: list[Any]
     if isinstance(landmarks, (str, os.PathLike)):
-        folder = as_path(landmarks)
+        folder = as_path(landmarks).absolute()
         if not folder.is_dir():
             raise FileNotFoundError(2, "no such folder", str(folder))
         marks = [folder / f"{shape.name}.csv" for shape in shapes]
@@ -169,7 +174,8 @@ def gather_landmarks(shapes: list[Shape], landmarks: Any) -> list[Shape]:
 
 def _shape(entry: Any, name: str) -> Shape:
     if isinstance(entry, (str, os.PathLike)):
-        return Shape(name, as_path(entry))
+        # A run may be asked for a shape after the working directory has become another.
+        return Shape(name, as_path(entry).absolute())
     return Shape(name, as_solid(entry, f"solids[{name}]"))
 
 

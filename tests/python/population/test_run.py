@@ -311,6 +311,55 @@ def test_what_is_skipped_is_told_once(folder, landmarks, caplog):
     assert sum("bad is skipped" in r.getMessage() for r in caplog.records) == 1
 
 
+def test_a_folder_is_that_of_its_shapes(bones, tmp_path):
+    place, solids = tmp_path / "run", bones.solids
+    options = {"folder": place, "max_rounds": 1, "tol": 0.0}
+    shapes = dict(zip("ab", solids, strict=False))
+    marks = dict(zip("abc", bones.landmarks, strict=False))
+    first = sm.population.fit(shapes, landmarks=marks, **options)
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    for others, moved, template, match in (
+        ({"a": solids[0], "b": solids[3]}, marks, None, "other shapes by the names of b"),
+        (shapes, marks | {"a": marks["a"][:-1]}, None, "names of a, or with other landmarks"),
+        (shapes, marks, "b", "other settings"),
+    ):
+        with pytest.raises(OptionError, match=match):
+            sm.population.fit(others, template, landmarks=moved, **options)
+    assert before == {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    again = sm.population.fit(shapes | {"c": solids[2]}, landmarks=marks, **options)
+    assert again.names == ("a", "b", "c")
+    np.testing.assert_array_equal(again.map("a").image, first.map("a").image)
+    assert before[place / "maps" / "a-0.npz"] == (place / "maps" / "a-0.npz").read_bytes()
+
+
+def test_a_shape_without_a_map_may_be_replaced_and_a_file_be_gone(bones, landmarks, tmp_path):
+    files = [tmp_path / f"bone{i}.npz" for i in range(3)]
+    for file, solid in zip(files, bones.solids, strict=False):
+        sm.write(file, solid)
+    files[1].write_bytes(b"no bone")
+    options = {
+        "landmarks": landmarks, "folder": tmp_path / "run", "max_rounds": 1, "tol": 0.0,
+    }  # fmt: skip
+    assert set(sm.population.fit(files, **options).skipped) == {"bone1"}
+    sm.write(files[1], bones.solids[1])
+    files[2].rename(tmp_path / "elsewhere.npz")
+    assert set(sm.population.fit(files, **options).skipped) == {"bone2"}
+    (tmp_path / "elsewhere.npz").rename(files[2])
+    assert not sm.population.fit(files, **options).skipped
+
+
+def test_a_result_finds_its_files_from_another_directory(bones, landmarks, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for i, solid in enumerate(bones.solids[:2]):
+        sm.write(f"bone{i}.npz", solid)
+    files = ["bone0.npz", "bone1.npz"]
+    found = sm.population.fit(files, landmarks=landmarks, folder="run", max_rounds=1, tol=0.0)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert found.map("bone0").mesh.n_vertices >= found.mean.n_vertices
+    assert found.shapes[1].load().n_tets == bones.solids[1].n_tets
+
+
 def test_runs_that_cannot_be(serial, folder, bones):
     with pytest.raises(OptionError, match="other settings"):
         sm.population.fit(folder, folder=serial.folder, along="area")
