@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import multiprocessing
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -21,6 +22,7 @@ __all__ = ["Dask", "Executor", "Processes", "Serial", "WorkerLost", "as_executor
 
 _ATTEMPTS = 3  # of a job whose worker dies
 _SCHEME = "dask://"
+_ADDRESS = re.compile(r"dask://[^\s/]+:[0-9]{1,5}")
 
 Task = Callable[[Any], Any]
 
@@ -161,7 +163,7 @@ class Dask:
                 "a Dask cluster needs distributed: pip install 'stretchmap[cluster]'"
             )
         address = cluster if isinstance(cluster, str) else ""
-        if not address.startswith(_SCHEME) and not _is_client(cluster):
+        if not _ADDRESS.fullmatch(address) and not _is_client(cluster):
             raise OptionError(
                 f"cluster must be 'dask://host:port' or a Dask client, got {shown(cluster)}"
             )
@@ -208,7 +210,7 @@ def as_executor(executor: Any) -> Executor:
         if executor == "serial":
             return Serial()
         name, _, count = executor.partition(":")
-        if name == "processes" and (not count or count.isdigit()):
+        if name == "processes" and (not count or count.isdecimal()):
             return Processes(int(count) if count else None)
         if executor.startswith(_SCHEME):
             return Dask(executor)

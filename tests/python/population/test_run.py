@@ -381,6 +381,24 @@ def test_runs_that_cannot_be(serial, folder, bones):
             sm.population.fit(bones.solids, **options)
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dask://",
+        "dask://host",
+        "dask://:8786",
+        "dask://host:x",
+        "dask://tcp://host:1",
+        "processes:²",
+    ],
+)
+def test_executors_that_name_no_place_are_refused(name):
+    if name.startswith("dask"):
+        pytest.importorskip("distributed")
+    with pytest.raises(OptionError, match="must be"):
+        as_executor(name)
+
+
 def test_material_points_are_found_again(bones):
     points = bones.solids[1].V
     assert np.abs(material(bones, 1, points) - bones.material[1]).max() < 1e-9 * size(points)
