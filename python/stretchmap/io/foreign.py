@@ -4,6 +4,7 @@ PyVista."""
 from __future__ import annotations
 
 import importlib.util
+import logging
 import re
 import signal
 import subprocess
@@ -15,12 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.options import shown
 from ..errors import FileFormatError, MissingDependencyError
 from .arrays import MeshArrays
 from .cells import Block, simplices
 from .npz import read_archive
 
-__all__ = ["VTK_SCRIPT", "is_for_vtk_alone", "read_pyvista", "read_trimesh", "run_vtk"]
+__all__ = ["VTK_SCRIPT", "for_vtk_alone", "read_pyvista", "read_trimesh", "run_vtk"]
+
+_log = logging.getLogger("stretchmap")
 
 # VTK's numbers of cell types; what is missing is named by its number.
 _VTK = {
@@ -28,8 +32,29 @@ _VTK = {
     10: "tetra", 12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6",
     24: "tetra10", 69: "triangle", 71: "tetra",
 }  # fmt: skip
-_NOT_FOR_MESHIO = re.compile(
-    rb"^DATASET[ \t]+POLYDATA\b|^[^\s#].{0,200}[ \t](?:unsigned_)?long[ \t]*\r?$", re.MULTILINE
+# What a .vtk file holds that meshio does not know, or passes over, by the file's version.
+_HEADER = rb"^(?:(?:SCALARS|VECTORS|TENSORS)[ \t]+\S+|POINTS[ \t]+\d+|\S+[ \t]+\d+[ \t]+\d+)[ \t]+"
+_IN_VTK = {
+    modern: re.compile(
+        rb"^DATASET[ \t]+POLYDATA\b"
+        rb"|^(?:COLOR_SCALARS|NORMALS|TEXTURE_COORDINATES|GLOBAL_IDS|PEDIGREE_IDS)[ \t].*$"
+        rb"|^LOOKUP_TABLE[ \t]+\S+[ \t]+\d+|"
+        + _HEADER
+        + rb"(?:bit|signed_char|(?:unsigned_)?long|vtkIdType|string|variant|"
+        + further
+        + rb")(?:[ \t]+\d+)?[ \t]*\r?$",
+        re.MULTILINE,
+    )
+    for modern, further in (
+        (True, rb"(?:unsigned_)?(?:char|short)|unsigned_int"),
+        (False, rb"vtktype\w+"),
+    )
+}
+# The same of a .vtu file: text, with which PyVista marks truth values and complex numbers, other
+# versions and compressors.
+_IN_VTU = re.compile(
+    rb"<Array\b[^>]*>|<DataArray\b[^>]*\btype=.(?:String|Bit|vtkIdType)\b[^>]*>"
+    rb"|<VTKFile\b[^>]*\b(?:version=.2|compressor=.vtkLZ4)[^>]*>"
 )
 # VTK's readers abort on some files, write past arrays on others and do not come to an end on a few:
 # they get a process of their own, and processor time by the length of the file.
@@ -47,21 +72,32 @@ if isinstance(grid, pyvista.MultiBlock):
 grid = grid.cast_to_unstructured_grid()
 arrays = {"points": grid.points, "types": grid.celltypes, "cells": grid.cell_connectivity,
           "offsets": grid.offset}
+left_out = []
 for prefix, data in (("p:", grid.point_data), ("c:", grid.cell_data)):
     for name in data.keys():
         if numpy.asarray(data[name]).dtype.kind in "biuf":
-            arrays[prefix + name.replace("/", "_")] = numpy.asarray(data[name])
+            arrays[prefix + name] = numpy.asarray(data[name])
+        else:
+            left_out.append(name)
+arrays["left_out"] = numpy.array(left_out, str)
 numpy.savez(sys.argv[2], **arrays)
 """
 
 
-def is_for_vtk_alone(path: Path) -> bool:
-    """Whether a ``.vtk`` file is of a kind meshio does not know: a surface, or 64-bit data."""
-    return _NOT_FOR_MESHIO.search(path.read_bytes()) is not None
+def for_vtk_alone(path: Path) -> str | None:
+    """What of a ``.vtk`` or ``.vtu`` file meshio does not know, as it stands there, if anything."""
+    data = path.read_bytes()
+    if path.suffix.lower() == ".vtu":
+        found = _IN_VTU.search(data)
+    else:
+        found = _IN_VTK[data[:26] == b"# vtk DataFile Version 5.1"].search(data)
+    return None if found is None else found[0].decode("ascii", "replace").strip()
 
 
-def read_pyvista(path: Path) -> MeshArrays:
-    """Read a file by VTK: ``.vtp``, and ``.vtk`` of the kinds that meshio does not know.
+def read_pyvista(path: Path, found: str | None = None) -> MeshArrays:
+    """Read a file by VTK: ``.vtp``, and others that hold what meshio does not know.
+
+    Arrays of text and of complex numbers are left out; the log says so.
 
     Raises
     ------
@@ -71,8 +107,13 @@ def read_pyvista(path: Path) -> MeshArrays:
         PyVista is not installed.
     """
     if importlib.util.find_spec("pyvista") is None:
+        if found is None:
+            raise MissingDependencyError(
+                f"reading {path.suffix} files needs pyvista: pip install 'stretchmap[viz]'"
+            )
         raise MissingDependencyError(
-            f"reading {path.suffix} files needs pyvista: pip install 'stretchmap[viz]'"
+            f"{path} holds what only VTK reads, {shown(found)}: pip install 'stretchmap[viz]', or "
+            "save it without"
         )
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "grid.npz")
@@ -84,6 +125,8 @@ def read_pyvista(path: Path) -> MeshArrays:
             raise FileFormatError(f"VTK cannot read it: {said[-1] if said else 'no reason given'}")
         with open(out, "rb") as file:
             arrays = read_archive(file)
+    if len(arrays["left_out"]):
+        _log.info("%s: arrays of no real numbers left out: %s", path, ", ".join(arrays["left_out"]))
     point_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "p:"}
     return simplices(arrays["points"], _blocks(arrays), point_data)
 

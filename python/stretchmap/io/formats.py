@@ -10,7 +10,7 @@ format                        holds      remarks
 ``.stl``                      surfaces   single precision; equal corners become one vertex
 ``.vtu .vtk .xdmf .msh``      both       point and cell arrays; through meshio
 ``.mesh``                     both       no arrays; through meshio
-``.vtp``                      surfaces   read only; through PyVista, as ``.vtk`` of surfaces
+``.vtp``                      surfaces   read only; through PyVista, as what meshio does not know
 ``.glb .gltf .3mf``           surfaces   read only; through trimesh, parts joined and welded
 ============================  =========  ======================================================
 """

@@ -11,7 +11,7 @@ from ..errors import FileFormatError
 from ..mesh.given import as_solid, as_surface
 from ..mesh.meshes import TetMesh, TriMesh
 from .arrays import MeshArrays
-from .foreign import is_for_vtk_alone, read_pyvista, read_trimesh
+from .foreign import for_vtk_alone, read_pyvista, read_trimesh
 from .formats import BY_MESHIO, BY_TRIMESH, known_suffix
 from .gmsh import is_gmsh, read_gmsh
 from .meshio import read_meshio
@@ -198,6 +198,8 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
     with parsing(path):
         if suffix in BY_TRIMESH:
             return read_trimesh(path)
-        if suffix == ".vtp" or (suffix == ".vtk" and is_for_vtk_alone(path)):
+        if suffix == ".vtp":
             return read_pyvista(path)
+        if suffix in (".vtk", ".vtu") and (found := for_vtk_alone(path)) is not None:
+            return read_pyvista(path, found)
         return read_meshio(path, BY_MESHIO[suffix])

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
-from stretchmap.errors import FileFormatError
+from stretchmap.errors import FileFormatError, MissingDependencyError
 from stretchmap.io import read, read_arrays
+from stretchmap.io.foreign import for_vtk_alone
 
 # Two tets of a physical group, one of none, a triangle and a point beside them; tags with gaps.
 GMSH = """$MeshFormat
@@ -220,6 +221,56 @@ def test_solids_as_pyvista_saves_them(tmp_path):
         found = read_arrays(tmp_path / "t.vtk")
         np.testing.assert_allclose(found.V, solid.V, atol=0 if binary else 1e-5)
         np.testing.assert_array_equal(found.T, solid.T)
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk"])
+def test_arrays_of_every_kind_as_pyvista_saves_them(suffix, tmp_path, monkeypatch, caplog):
+    pytest.importorskip("pyvista")
+    solid = sm.samples.solid_torus(600)
+    rows = np.arange(solid.n_tets)
+    kept = {f"{kind} of": (rows % 100).astype(kind) for kind in ("?", "i1", "u1", "i2", "u8", "f4")}
+    data = solid.to_pyvista()
+    for name, array in {**kept, "a/b": rows, "wave": rows * 1j, "text": rows.astype(str)}.items():
+        data.cell_data[name] = array
+    data.user_dict = {"who": "we"}
+    path = tmp_path / f"t{suffix}"
+    data.save(path)
+    with caplog.at_level(logging.INFO, logger="stretchmap"):
+        found = read_arrays(path)
+    np.testing.assert_array_equal(found.T, solid.T)
+    assert set(found.cell_data) == {*kept, "a/b"}
+    for name, array in kept.items():
+        assert found.cell_data[name].dtype == array.dtype
+        np.testing.assert_array_equal(found.cell_data[name], array)
+    assert "no real numbers left out: " in caplog.text
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(
+        MissingDependencyError, match=rf"t{suffix} holds .*stretchmap\[viz\].* without"
+    ):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("version", "line", "found"),
+    [
+        (b"5.1", b"SCALARS part unsigned_char", True),
+        (b"4.2", b"SCALARS part unsigned_char", False),
+        (b"4.2", b"SCALARS part signed_char 1", True),
+        (b"5.1", b"heat 1 4 vtktypeint64", False),
+        (b"4.2", b"heat 1 4 vtktypeint64", True),
+        (b"5.1", b"COLOR_SCALARS part 1", True),
+        (b"5.1", b"LOOKUP_TABLE default", False),
+        (b"5.1", b"LOOKUP_TABLE colors 256", True),
+        (b"5.1", b"POINTS 4 double", False),
+        (b"5.1", b"name 1 4 string\r", True),
+        (b"5.1", b"how long", False),
+        (b"5.1", b"DATASET POLYDATA", True),
+    ],
+)
+def test_what_meshio_does_not_know_of_vtk_is_seen(version, line, found, tmp_path):
+    path = tmp_path / "t.vtk"
+    path.write_bytes(b"# vtk DataFile Version " + version + b"\ntitle\nBINARY\n" + line + b"\n\0")
+    assert (for_vtk_alone(path) is not None) == found
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".3mf"])
