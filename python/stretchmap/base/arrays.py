@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,19 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Return ``array`` itself, marked as not writable."""
     array.flags.writeable = False
     return array
+
+
+def freeze(value: Any) -> None:
+    """Mark all arrays as not writable that a value is made of: containers and data classes."""
+    if isinstance(value, np.ndarray):
+        read_only(value)
+    elif isinstance(value, Mapping):
+        freeze(list(value.values()))
+    elif isinstance(value, (tuple, list)):
+        for entry in value:
+            freeze(entry)
+    elif is_dataclass(value):
+        freeze(vars(value))
 
 
 def for_legacy_vtk(array: NDArray[Any]) -> NDArray[Any]:

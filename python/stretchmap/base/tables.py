@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import freeze
+
 
 def versions() -> dict[str, str]:
     """Versions of stretchmap and of what it computes with."""
@@ -66,7 +68,8 @@ def cell(value: Any) -> str:
 
 
 class HasSummary:
-    """What notebooks show as a table: anything with a ``summary()`` of names and values."""
+    """What results share: notebooks show their ``summary()``, and copies are as read-only as they
+    are."""
 
     def summary(self) -> str:
         """A table of names and values."""
@@ -74,6 +77,11 @@ class HasSummary:
 
     def _repr_html_(self) -> str:
         return html(self.summary())
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Of a copy or a pickle, in which NumPy makes all arrays writable."""
+        self.__dict__.update(state)
+        freeze(state)
 
 
 def html(text: str) -> str:

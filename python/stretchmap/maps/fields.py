@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arrays import read_only
 from ..errors import ArrayError
 from ..io.arrays import checked
 from ..mesh.halved_faces import SurfaceRefinement
@@ -64,7 +65,12 @@ def carried(
             for name, array in points.items()
         }
         cells = {k: a if len(a) == m else a[parent] for k, a in cells.items()}
-    return points, cells
+    return _copies(points), _copies(cells)
+
+
+def _copies(fields: Fields) -> Fields:
+    """Arrays that stay what they are, whatever the caller does to those that were given."""
+    return {name: read_only(array.copy()) for name, array in fields.items()}
 
 
 def _own(fields: Fields) -> Fields:

@@ -133,7 +133,9 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
         point_data: Mapping[str, ArrayLike] | None = None,
         cell_data: Mapping[str, ArrayLike] | None = None,
     ) -> _Map:
-        """The map with fields of its input, which its files and frames then carry.
+        """The map with further fields of its input, which its files and frames then carry.
+
+        Fields it has stay, but for those of the same name.
 
         Parameters
         ----------
@@ -149,7 +151,11 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
         """
         added = getattr(self, "refinement", None)
         points, cells = carried(self.mesh, added, point_data, cell_data)
-        return dataclasses.replace(self, point_fields=points, cell_fields=cells)
+        return dataclasses.replace(
+            self,
+            point_fields={**self.point_fields, **points},
+            cell_fields={**self.cell_fields, **cells},
+        )
 
     def extra_arrays(self) -> dict[str, NDArray[Any]]:
         """Further arrays to be kept in a map file, by name."""

@@ -3,6 +3,9 @@ for viewers."""
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -39,6 +42,29 @@ def test_fields_named_like_those_of_a_map_are_left_out_aloud(coarse, caplog):
     carried = coarse.with_fields({"u": coarse.mesh.V[:, 0], "load": coarse.mesh.V[:, 1]})
     assert set(carried.point_fields) == {"load"}
     assert "left out: u; give them other names" in caplog.text
+
+
+def test_fields_are_added_to_those_there_as_copies(coarse):
+    x, y = coarse.mesh.V[:, 0].copy(), np.arange(coarse.mesh.n_tets)
+    carried = coarse.with_fields({"x": x, "load": x}).with_fields({"load": 2.0 * x}, {"y": y})
+    assert set(carried.point_fields) == {"x", "load"} and set(carried.cell_fields) == {"y"}
+    x[:], y[:] = 7.0, 7
+    np.testing.assert_array_equal(carried.point_fields["x"], coarse.mesh.V[:, 0])
+    np.testing.assert_array_equal(carried.point_fields["load"], 2.0 * coarse.mesh.V[:, 0])
+    np.testing.assert_array_equal(carried.cell_fields["y"], np.arange(coarse.mesh.n_tets))
+    assert not carried.point_fields["load"].flags.writeable
+
+
+@pytest.mark.parametrize(
+    "again", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))], ids=["copied", "pickled"]
+)
+def test_copies_of_results_are_as_read_only_as_they_are(coarse, again):
+    result = again(coarse.with_fields({"x": coarse.mesh.V[:, 0]}))
+    np.testing.assert_array_equal(result.image, coarse.image)
+    inside = (result.image, result.mesh.V, result.point_fields["x"], result.refinement.parent_tet)
+    distortion = again(coarse.distortion)  # results have arrays beside maps, too
+    for array in (*inside, result.boundary_map.image, result.distortion.ratios, distortion.ratios):
+        assert not array.flags.writeable
 
 
 def test_added_vertices_and_tets_inherit(coarse):
