@@ -20,7 +20,9 @@ SUCCESS, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 # Seconds an interrupted computation gets to clean up before the process ends all the same.
 _GRACE = 1.0
 _ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
-_NO_FAULT_OF_THE_INPUT = {errno.ENOSPC, errno.EIO, errno.EDQUOT}
+_NO_FAULT_OF_THE_INPUT = {
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE
+}  # fmt: skip
 
 
 def guarded(run: Callable[[], object]) -> int:

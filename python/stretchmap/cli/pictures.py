@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,6 +15,9 @@ from .common import Json, MapFile, Output, Quiet
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TetMesh
+
+
+_DPI = 150.0
 
 
 class Kind(str, Enum):
@@ -71,7 +75,7 @@ def plot(
         Color | None,
         typer.Option(help="For cutaway: place in the source (default) or volume ratio."),
     ] = None,
-    dpi: Annotated[float, typer.Option(help="Dots per inch.", min=20.0, max=1200.0)] = 150.0,
+    dpi: Annotated[float, typer.Option(help="Dots per inch.", min=20.0, max=1200.0)] = _DPI,
 ) -> None:
     """Draw a picture of a map (.png, .pdf or .svg).
 
@@ -116,6 +120,7 @@ def demo(
     Needs no data.
     """
     from .. import plot, samples
+    from ..base.files import atomic_path
     from ..base.progress import terminal
     from ..volume.map import volume_map
     from .results import conclude
@@ -141,8 +146,11 @@ def demo(
     watch.lap("pictures")
     output.mkdir(parents=True, exist_ok=True)
     common.check_output(output / "map.npz", (".npz",))
-    conclude(result, output / "map.npz", json, quiet, watch)
-    for figure, name in ((histogram, "ratios.png"), (torus, "torus.png")):
-        plot.save(figure, output / name)
-        if not quiet:
-            typer.echo(f"written to {output / name}")
+    pictures = {output / "ratios.png": histogram, output / "torus.png": torus}
+    with ExitStack() as stack:  # all files or none
+        for path, figure in pictures.items():
+            figure.savefig(stack.enter_context(atomic_path(path)), dpi=_DPI)
+        conclude(result, output / "map.npz", json, quiet, watch)
+    if not quiet:
+        for path in pictures:
+            typer.echo(f"written to {path}")

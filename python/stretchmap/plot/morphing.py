@@ -127,9 +127,13 @@ class Morph(HasSummary):
             for t, frame in zip(self.times, frames, strict=True)
         ]
         text = _COLLECTION.format("\n".join(lines))
-        # The frames appear together, once all of them are written, and what names them last.
+        # The frames appear together, once all files are written, and what names them last.
         beside = path.absolute().parent
-        with tempfile.TemporaryDirectory(prefix=".stretchmap-", dir=beside) as place:
+        with (
+            atomic_path(path) as temporary,
+            tempfile.TemporaryDirectory(prefix=".stretchmap-", dir=beside) as place,
+        ):
+            temporary.write_text(text, encoding="utf-8")
             for i, frame in enumerate(frames):
                 solid = TetMesh(self.frame(i), self.solid.T)
                 io.write(
@@ -137,8 +141,6 @@ class Morph(HasSummary):
                 )
             for frame in frames:
                 os.replace(Path(place, frame.name), frame)
-        with atomic_path(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
         return [*frames, path]
 
     def picture(self, count: int = 4) -> Figure:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import inspect
 import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -72,6 +75,18 @@ def test_morph_files(bumpy_map, tmp_path):
         morph(bumpy_map, 1)
     with pytest.raises(KindError, match="map of a solid"):
         morph(sm.area_map(bumpy_map.mesh.surface))
+
+
+def test_frames_without_what_names_them_do_not_stay(bumpy_map, tmp_path, monkeypatch):
+    pytest.importorskip("meshio")
+
+    def full(self, *arguments, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match=r"m\.pvd"):
+        morph(bumpy_map, 2).save(tmp_path / "m.pvd")
+    assert not list(tmp_path.iterdir())
 
 
 def test_morph_picture(bumpy_map, tmp_path):

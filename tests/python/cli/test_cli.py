@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -430,6 +431,24 @@ def test_demo_needs_no_data(tmp_path, capsys):
     assert figures["certified"] and figures["flips"] == 0
 
 
+def test_a_demo_that_cannot_be_written_leaves_no_file(tmp_path, capsys, monkeypatch):
+    figure = pytest.importorskip("matplotlib.figure").Figure
+    save, saved = figure.savefig, []
+
+    def full(self, path, **options):
+        if saved:
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+        saved.append(path)
+        save(self, path, **options)
+
+    monkeypatch.setattr(figure, "savefig", full)
+    out, report = tmp_path / "out", tmp_path / "demo.json"
+    arguments = ["demo", "-o", str(out), "--sample", "torus", "--n-tets", "300", "-q"]
+    assert main([*arguments, "--json", str(report)]) == 1
+    assert f"torus.png: {os.strerror(errno.EFBIG)}" in capsys.readouterr().err
+    assert not list(out.iterdir()) and not report.exists()
+
+
 def test_help_names_every_command_and_version(capsys):
     assert main([]) == 0
     out = capsys.readouterr().out
@@ -456,6 +475,17 @@ def test_python_words_become_options():
     assert in_words_of_the_command_line(text) == (
         "pass --orient, or --method certified (--keep-best); --compact does"
     )
+
+
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(errno.ENOSPC, 1), (errno.EFBIG, 1), (errno.EMFILE, 1), (errno.ENOMEM, 1), (errno.ENOENT, 2)],
+)
+def test_what_the_machine_has_no_room_for_is_no_bad_input(number, code):
+    def fails():
+        raise OSError(number, os.strerror(number), "out.npz")
+
+    assert guarded(fails) == code
 
 
 def test_unexpected_errors_are_one_line_too(capsys, monkeypatch):
