@@ -168,7 +168,9 @@ def partition(
             "separated by colons."
         ),
     ] = "5",
-    start: Annotated[float, typer.Option(help="Angle where the first sector begins.")] = 0.0,
+    start: Annotated[
+        float, typer.Option(help="Angle where the first sector begins, of u or v.")
+    ] = 0.0,
     correct: Annotated[bool, typer.Option(help="Move the levels until volumes are exact.")] = True,
     json: Json = None,
     quiet: Quiet = False,

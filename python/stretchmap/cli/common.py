@@ -180,10 +180,12 @@ def check_output(path: Path, allowed: tuple[str, ...], *others: Path | None) -> 
     MissingDependencyError
         The format needs a package that is not installed.
     OptionError
-        It is one of the other files.
+        It is one of the other files, or ``-``.
     OSError
         The folder is missing or not writable, or the path is a folder.
     """
+    if str(path) == "-":
+        raise OptionError("nothing is written to standard output: name a file instead of '-'")
     suffix = path.suffix.lower()
     if suffix not in allowed:
         raise FileFormatError(

@@ -112,7 +112,9 @@ def certify(
     map_file: MapFile,
     torus: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="R r", help="Radii, if the file names none.", show_default=False),
+        typer.Option(
+            metavar="R r", help="Radii, in place of those of the file.", show_default=False
+        ),
     ] = None,
     tolerance: Annotated[
         float, typer.Option(help="Largest distance of the boundary from the torus, over r.")

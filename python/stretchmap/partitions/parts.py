@@ -206,7 +206,7 @@ def partition(
         Nested shells, sectors the long way round, sectors around the tube. Several make a grid; its
         parts are numbered with the last coordinate running fastest.
     start : float
-        Angle in radians at which the first sector of ``u`` or ``v`` begins.
+        Angle in radians at which the first sector of ``u`` or ``v`` begins; of shells alone 0.
     correct : bool
         Move the levels until every part, and every cell of a grid, has exactly its share of the
         source's volume (up to rounding, about 1e-13). False: cut at the uncorrected levels.
@@ -246,6 +246,8 @@ def partition(
     mapped, source = as_map_of_solid(result, "a partition")
     axes, shares = asked_shares(fractions, by, source.n_tets)
     start, correct = real("start", start, -MOST_ANGLE, MOST_ANGLE), flag("correct", correct)
+    if start != 0.0 and axes == ("s",):
+        raise OptionError("start is the angle where sectors of u or v begin; shells have none")
     pieces = Pieces.of(source, mapped.image, torus_of(mapped))
     uncorrected = [
         levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)

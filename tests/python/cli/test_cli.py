@@ -245,6 +245,8 @@ def test_orientation_is_repaired_on_request(folder, capsys):
         (["volume", "solid.npz", "-o", "solid.npz"], "would be replaced"),
         (["volume", "solid.npz", "-o", "x.npz", "--json", "x.npz"], "would be replaced"),
         (["volume", "solid.npz", "-o", "x.npz", "--json", "absent/x.json"], "no such folder"),
+        (["volume", "solid.npz", "-o", "x.npz", "--json", "-"], "instead of '-'"),
+        (["info", "solid.npz", "--json", "-"], "instead of '-'"),
         (["volume", "solid.npz"], "--output"),
         (["volume", "solid.npz", "-o", "x.npz", "--ratio", "0.5"], "above 1"),
         (["volume", "solid.npz", "-o", "x.npz", "--ratio", "wide"], "'wide'"),
@@ -310,6 +312,18 @@ def test_certify_judges_any_map_file(folder, capsys, solid):
     good, bad = (json.loads((folder / f).read_text()) for f in ("good.json", "bad.json"))
     assert good["certified"] and not bad["certified"]
     assert bad["ids"]["image_positive"]
+
+
+def test_radii_that_are_asked_for_count_more_than_those_of_the_file(folder, capsys, solid):
+    np.savez("doubled.npz", V=solid.V, T=solid.T, image=2.0 * solid.V, torus=[6.0, 2.0])
+    reports = [("of_file.json", []), ("of_option.json", ["--torus", "9", "1"])]
+    for name, options in reports:
+        main(["certify", "doubled.npz", "--json", name, "-q", *options])
+    of_file, of_option = (json.loads((folder / name).read_text()) for name, _ in reports)
+    assert of_file["quantities"] != of_option["quantities"]
+    capsys.readouterr()
+    main(["certify", "--help"])
+    assert "in place of those of the file" in " ".join(capsys.readouterr().out.split())
 
 
 def test_a_boundary_is_filled_from_its_file_or_refused(folder, capsys, solid):

@@ -194,6 +194,7 @@ def test_saving(bumpy_map, tmp_path):
         {"by": ("u", "u"), "fractions": (2, 2)},
         {"by": ("u", "s"), "fractions": (2,)},
         {"start": np.inf},
+        {"start": 1.0, "by": "s"},
     ],
 )
 def test_bad_options_are_named(bumpy_map, options):
