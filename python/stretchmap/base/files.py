@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import FileFormatError, StretchmapError
+from ..errors import FileFormatError, KindError, StretchmapError
 from .options import as_path
 
 try:
@@ -100,7 +100,7 @@ def parsing(path: Path) -> Iterator[None]:
     """Turn whatever a parser raises into one error that names the file."""
     try:
         yield
-    except FileFormatError as error:
+    except (FileFormatError, KindError) as error:
         raise FileFormatError(f"{path} cannot be read: {error}") from error
     except StretchmapError:
         raise

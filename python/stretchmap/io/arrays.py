@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import as_reals, as_rows
 from ..errors import ArrayError, FileFormatError
+from ..mesh.exchange import Cells
 
 _log = logging.getLogger("stretchmap")
 
@@ -52,6 +53,12 @@ class MeshArrays:
     cell_data: dict[str, NDArray[Any]] = field(default_factory=dict)
     extra: dict[str, NDArray[Any]] = field(default_factory=dict)
     corner_uv: NDArray[np.float64] | None = None
+
+    @classmethod
+    def of(cls, cells: Cells) -> MeshArrays:
+        """Triangles or tets with their data."""
+        F, T = (None, cells.cells) if cells.kind == "tetra" else (cells.cells, None)
+        return cls(cells.points, F, T, cells.point_data, cells.cell_data)
 
     @property
     def elements(self) -> NDArray[Any]:
@@ -105,41 +112,6 @@ def checked_uv(
     if suffix != ".obj":
         raise FileFormatError(f"{suffix} files hold no texture coordinates; write an .obj")
     return as_reals(corner_uv, "corner_uv", (len(faces), 3, 2))
-
-
-def fans(corners: NDArray[Any], sizes: NDArray[Any]) -> NDArray[Any]:
-    """Triangles of polygons, each a fan from its first corner; says how many were split.
-
-    Parameters
-    ----------
-    corners : (c, ...) ndarray
-        Corners of all polygons, one after the other: vertex ids, or rows of several ids each.
-    sizes : (m,) ndarray of integers
-        Number of corners of each polygon.
-
-    Returns
-    -------
-    (t, 3, ...) ndarray
-        No corner is added; triangles of a polygon follow each other in its place.
-
-    Raises
-    ------
-    FileFormatError
-        A polygon of fewer than three corners.
-    """
-    if (sizes < 3).any():
-        raise FileFormatError(f"{int((sizes < 3).sum())} faces with fewer than three corners")
-    count = sizes - 2
-    polygon = np.repeat(np.arange(len(sizes)), count)
-    first = (np.cumsum(sizes) - sizes)[polygon]
-    step = np.arange(len(polygon)) - (np.cumsum(count) - count)[polygon]
-    n_split = int((sizes > 3).sum())
-    if n_split:
-        _log.warning(
-            "%d polygons were split into %d triangles", n_split, int(count[sizes > 3].sum())
-        )
-    ids = np.stack([first, first + step + 1, first + step + 2], axis=1)
-    return np.asarray(corners[ids])
 
 
 def lines_of(data: bytes) -> bytes:

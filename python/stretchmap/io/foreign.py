@@ -18,20 +18,14 @@ from numpy.typing import NDArray
 
 from ..base.options import shown
 from ..errors import FileFormatError, MissingDependencyError
+from ..mesh.cells import blocks_of_vtk, simplices
 from .arrays import MeshArrays
-from .cells import Block, simplices
 from .npz import read_archive
 
 __all__ = ["VTK_SCRIPT", "for_vtk_alone", "read_pyvista", "read_trimesh", "run_vtk"]
 
 _log = logging.getLogger("stretchmap")
 
-# VTK's numbers of cell types; what is missing is named by its number.
-_VTK = {
-    1: "vertex", 2: "vertex", 3: "line", 4: "line", 5: "triangle", 7: "polygon", 9: "quad",
-    10: "tetra", 12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6",
-    24: "tetra10", 69: "triangle", 71: "tetra",
-}  # fmt: skip
 # What a .vtk file holds that meshio does not know, or passes over, by the file's version.
 _HEADER = rb"^(?:(?:SCALARS|VECTORS|TENSORS)[ \t]+\S+|POINTS[ \t]+\d+|\S+[ \t]+\d+[ \t]+\d+)[ \t]+"
 _IN_VTK = {
@@ -71,7 +65,7 @@ if isinstance(grid, pyvista.MultiBlock):
     grid = grid.combine()
 grid = grid.cast_to_unstructured_grid()
 arrays = {"points": grid.points, "types": grid.celltypes, "cells": grid.cell_connectivity,
-          "offsets": grid.offset}
+          "offsets": grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset}
 left_out = []
 for prefix, data in (("p:", grid.point_data), ("c:", grid.cell_data)):
     for name in data.keys():
@@ -128,24 +122,12 @@ def read_pyvista(path: Path, found: str | None = None) -> MeshArrays:
     if len(arrays["left_out"]):
         _log.info("%s: arrays of no real numbers left out: %s", path, ", ".join(arrays["left_out"]))
     point_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "p:"}
-    return simplices(arrays["points"], _blocks(arrays), point_data)
-
-
-def _blocks(arrays: dict[str, NDArray[Any]]) -> list[Block]:
-    """The cells of a grid of VTK, by kind and number of corners."""
-    points, offsets = arrays["points"], arrays["offsets"].astype(np.int64)
-    sizes = np.diff(offsets)
-    named = np.unique(arrays["cells"])
-    if len(named) and not 0 <= named[0] <= named[-1] < len(points):
-        raise FileFormatError("cells name points that are not there")
     cell_data = {name[2:]: array for name, array in arrays.items() if name[:2] == "c:"}
-    blocks = []
-    for kind, size in np.unique(np.stack([arrays["types"], sizes]), axis=1).T.tolist():
-        rows = np.flatnonzero((arrays["types"] == kind) & (sizes == size))
-        cells = arrays["cells"][offsets[rows, None] + np.arange(size)]
-        data = {name: array[rows] for name, array in cell_data.items()}
-        blocks.append(Block(_VTK.get(kind, f"cells of VTK's type {kind}"), cells, data))
-    return blocks
+    points = arrays["points"]
+    blocks = blocks_of_vtk(
+        len(points), arrays["types"], arrays["cells"], arrays["offsets"], cell_data
+    )
+    return MeshArrays.of(simplices(points, blocks, point_data))
 
 
 def run_vtk(path: Path, out: Path) -> tuple[int, str]:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
+from ..mesh.cells import Block, simplices
 from .arrays import MeshArrays
-from .cells import Block, simplices
 from .gmsh_sources import Binary, Source, Text
 
 __all__ = ["is_gmsh", "read_gmsh"]
@@ -133,7 +133,7 @@ class _Found:
             data = {k: _by_tag(elements, rows) for k, rows in self.element_data.items()}
             blocks.append(Block(block.kind, order[place], {**block.data, **data}))
         data = {name: _by_tag(self.tags, rows) for name, rows in self.node_data.items()}
-        return simplices(self.points, blocks, data)
+        return MeshArrays.of(simplices(self.points, blocks, data))
 
 
 def _by_tag(tags: NDArray[Any], rows: _Rows) -> NDArray[np.float64]:

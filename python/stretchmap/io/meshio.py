@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError, MissingDependencyError
+from ..mesh.cells import Block, simplices, vertex_ids
 from .arrays import MeshArrays
-from .cells import Block, simplices
 from .storable import GMSH_TAGS
 
 _log = logging.getLogger("stretchmap")
@@ -48,6 +48,10 @@ _PRINTED = "".join(chr(code) for code in range(33, 127) if chr(code) not in '"%'
 _ONCE = {"medit": rb"(?m)^[ \t]*Vertices\b", "gmsh": rb"(?m)^\$Nodes\b"}
 
 
+class UnknownCellsError(FileFormatError):
+    """meshio has passed over cells, whose types it does not know or which are not there."""
+
+
 def read_meshio(path: Path, file_format: str) -> MeshArrays:
     """Read a file in one of meshio's formats.
 
@@ -66,6 +70,8 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     ------
     FileFormatError
         The file cannot be parsed or holds other cells.
+    UnknownCellsError
+        It announces more cells than meshio has found.
     MissingDependencyError
         meshio, or what it needs for this format, is not installed.
     """
@@ -77,9 +83,9 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
     blocks = []
     for b, block in enumerate(mesh.cells):
         data = {read_as(name): _native(parts[b]) for name, parts in mesh.cell_data.items()}
-        blocks.append(Block(block.type, _ids(block.data), data))
+        blocks.append(Block(block.type, vertex_ids(block.type, block.data), data))
     point_data = {read_as(name): _native(array) for name, array in mesh.point_data.items()}
-    return simplices(np.asarray(mesh.points), blocks, point_data)
+    return MeshArrays.of(simplices(np.asarray(mesh.points), blocks, point_data))
 
 
 def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
@@ -129,25 +135,13 @@ def _require_all(path: Path, file_format: str, found: int) -> None:
             return
         announced = sum(int(count) for count in re.findall(pattern, data))
     if announced != found:
-        raise FileFormatError(f"{announced} cells are announced, {found} can be understood")
+        raise UnknownCellsError(f"{announced} cells are announced, {found} can be understood")
 
 
 def _native(array: Any) -> NDArray[Any]:
     """In the machine's byte order, not the file's."""
     found: NDArray[Any] = np.asarray(array)
     return found.astype(found.dtype.newbyteorder("="), copy=False)
-
-
-def _ids(cells: Any) -> NDArray[Any]:
-    """Vertex ids as integers; meshio makes floats of unsigned ones, all of them whole."""
-    ids: NDArray[Any] = np.asarray(cells)
-    if ids.dtype.kind != "f":
-        return ids
-    with np.errstate(invalid="ignore"):
-        whole = ids.astype(np.int64)
-    if (whole != ids).any():
-        raise FileFormatError("cells name points by fractions")
-    return whole
 
 
 def _import(task: str) -> Any:

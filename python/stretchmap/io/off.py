@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .arrays import MeshArrays, fans, lines_of
+from ..mesh.cells import fans
+from .arrays import MeshArrays, lines_of
 
 
 def read_off(data: bytes) -> MeshArrays:

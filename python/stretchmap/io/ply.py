@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..base.options import shown
 from ..errors import ArrayError, FileFormatError
-from .arrays import MeshArrays, fans
+from ..mesh.cells import fans
+from .arrays import MeshArrays
 from .ply_rows import Bytes, Words
 
 _TYPES = {

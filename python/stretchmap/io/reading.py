@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from collections.abc import Callable
 
@@ -14,7 +15,7 @@ from .arrays import MeshArrays
 from .foreign import for_vtk_alone, read_pyvista, read_trimesh
 from .formats import BY_MESHIO, BY_TRIMESH, known_suffix
 from .gmsh import is_gmsh, read_gmsh
-from .meshio import read_meshio
+from .meshio import UnknownCellsError, read_meshio
 from .npz import read_npz
 from .obj import read_obj
 from .off import read_off
@@ -202,4 +203,9 @@ def read_arrays(path: str | os.PathLike[str]) -> MeshArrays:
             return read_pyvista(path)
         if suffix in (".vtk", ".vtu") and (found := for_vtk_alone(path)) is not None:
             return read_pyvista(path, found)
-        return read_meshio(path, BY_MESHIO[suffix])
+        try:
+            return read_meshio(path, BY_MESHIO[suffix])
+        except UnknownCellsError:
+            if importlib.util.find_spec("pyvista") is None:
+                raise
+            return read_pyvista(path)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import KindError
+from .cells import Block, blocks_of_vtk, simplices, vertex_ids
 from .meshes import TetMesh, TriMesh
 
 __all__ = ["converted", "from_meshio", "from_pyvista", "from_trimesh"]
@@ -19,7 +20,9 @@ def from_pyvista(data: Any) -> TriMesh | TetMesh:
     Parameters
     ----------
     data : pyvista.PolyData or pyvista.UnstructuredGrid
-        Of triangles, or of tets with or without triangles. Row i of ``V`` is its point i.
+        Of triangles and polygons, which are split, or of tets; what lies beside the tets is
+        ignored, and so are points and lines. Elements of higher order are taken by their corners;
+        without them row i of ``V`` is its point i.
 
     Returns
     -------
@@ -40,14 +43,13 @@ def from_pyvista(data: Any) -> TriMesh | TetMesh:
     """
     if not _is_of(data, "pyvista"):
         raise KindError(f"a PolyData or UnstructuredGrid is needed, got {type(data).__name__}")
-    if hasattr(data, "regular_faces"):
-        if not data.is_all_triangles:
-            raise KindError("the PolyData holds polygons; pass data.triangulate()")
-        return TriMesh(np.asarray(data.points), np.asarray(data.regular_faces))
-    if not hasattr(data, "cells_dict"):
+    if not any(hasattr(type(data), name) for name in ("regular_faces", "cells_dict")):
         raise KindError(f"a PolyData or UnstructuredGrid is needed, got {type(data).__name__}")
-    cells = {int(kind): np.asarray(ids) for kind, ids in data.cells_dict.items()}
-    return _mesh(data.points, cells.pop(5, None), cells.pop(10, None), [*cells])
+    grid = data.cast_to_unstructured_grid()
+    points = np.asarray(grid.points)
+    offsets = grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset  # before 0.49
+    types, cells = np.asarray(grid.celltypes), np.asarray(grid.cell_connectivity)
+    return _mesh(points, blocks_of_vtk(len(points), types, cells, np.asarray(offsets)))
 
 
 def from_trimesh(data: Any) -> TriMesh:
@@ -83,6 +85,7 @@ def from_meshio(data: Any) -> TriMesh | TetMesh:
     Parameters
     ----------
     data : meshio.Mesh
+        As `from_pyvista`.
 
     Returns
     -------
@@ -101,12 +104,8 @@ def from_meshio(data: Any) -> TriMesh | TetMesh:
     """
     if not _is_of(data, "meshio") or not hasattr(data, "cells"):
         raise KindError(f"a meshio.Mesh is needed, got {type(data).__name__}")
-    blocks: dict[str, list[NDArray[Any]]] = {}
-    for block in data.cells:
-        if len(block.data) and block.type not in ("vertex", "line", "line3"):
-            blocks.setdefault(block.type, []).append(np.asarray(block.data))
-    cells = {kind: np.concatenate(parts) for kind, parts in blocks.items()}
-    return _mesh(data.points, cells.pop("triangle", None), cells.pop("tetra", None), [*cells])
+    blocks = [Block(block.type, vertex_ids(block.type, block.data)) for block in data.cells]
+    return _mesh(np.asarray(data.points), blocks)
 
 
 def converted(given: Any) -> Any:
@@ -129,10 +128,7 @@ def _is_of(given: Any, library: str) -> bool:
     return any(kind.__module__.split(".")[0] == library for kind in type(given).__mro__)
 
 
-def _mesh(points: Any, faces: Any, tets: Any, others: list[Any]) -> TriMesh | TetMesh:
-    if others or (faces is None and tets is None):
-        found = ", ".join(map(str, others)) or "no cells"
-        raise KindError(f"only triangles and tets can be used, the mesh holds {found}")
-    if tets is not None:
-        return TetMesh(np.asarray(points), tets)
-    return TriMesh(np.asarray(points), faces)
+def _mesh(points: NDArray[Any], blocks: list[Block]) -> TriMesh | TetMesh:
+    found = simplices(points, blocks)
+    make = TetMesh if found.kind == "tetra" else TriMesh
+    return make(found.points, found.cells)

@@ -10,7 +10,7 @@ import pytest
 import shapes
 import stretchmap as sm
 from stretchmap import samples
-from stretchmap.errors import KindError, MissingDependencyError
+from stretchmap.errors import FileFormatError, KindError, MissingDependencyError
 from stretchmap.io import read_arrays
 from stretchmap.mesh.given import as_mesh, as_solid, as_surface
 
@@ -142,13 +142,75 @@ def test_fields_of_every_kind_come_back_from_files_bit_by_bit(suffix, tmp_path):
 
 def test_other_cells_and_objects_are_refused(surface):
     pyvista = pytest.importorskip("pyvista")
-    with pytest.raises(KindError, match="triangulate"):
-        sm.from_pyvista(pyvista.Cube())
-    with pytest.raises(KindError, match="holds 12"):
+    with pytest.raises(KindError, match="1 hexahedron; only triangles and tets"):
         sm.from_pyvista(pyvista.UnstructuredGrid({12: np.arange(8)[None]}, np.eye(8, 3)))
     for convert in (sm.from_pyvista, sm.from_trimesh, sm.from_meshio):
         with pytest.raises(KindError, match="is needed"):
             convert(surface)
+
+
+POINTS = np.vstack([np.zeros(3), np.eye(3), [[1, 1, 1]], np.random.default_rng(0).random((12, 3))])
+TETS = [[0, 1, 2, 3], [4, 3, 2, 1]]
+# Cells by VTK's number and meshio's name, None where it has none; and the elements they are.
+CELLS = {
+    "tets": ([(10, "tetra", TETS)], TETS),
+    "second order": ([(24, "tetra10", [[0, 1, 2, 3, *range(5, 11)]])], TETS[:1]),
+    "any order": ([(71, "VTK_LAGRANGE_TETRAHEDRON", [[0, 1, 2, 3, *range(5, 11)]])], TETS[:1]),
+    "and a point": ([(10, "tetra", TETS), (1, "vertex", [[0]])], TETS),
+    "and a line": ([(3, "line", [[0, 1]]), (10, "tetra", TETS)], TETS),
+    "and a polyline": ([(10, "tetra", TETS), (4, None, [[0, 1, 2]])], TETS),
+    "and a face": ([(5, "triangle", [[1, 2, 3]]), (10, "tetra", TETS)], TETS),
+    "faces of second order": ([(22, "triangle6", [[*range(6)]])], [[0, 1, 2]]),
+    "polygons": (
+        [(5, "triangle", [[1, 2, 4]]), (9, "quad", [[0, 1, 2, 3]]), (7, "polygon", [[*range(5)]])],
+        [[1, 2, 4], [0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 3], [0, 3, 4]],
+    ),
+    "hexahedra": ([(10, "tetra", TETS), (12, "hexahedron", [[*range(8)]])], None),
+    "no faces": ([(3, "line", [[0, 1]])], None),
+}
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_cells_are_taken_alike_from_objects_and_files(name, tmp_path):
+    pyvista, meshio = pytest.importorskip("pyvista"), pytest.importorskip("meshio")
+    given, wanted = CELLS[name]
+    rows = [row for _, _, block in given for row in block]
+    types = np.repeat([kind for kind, _, _ in given], [len(block) for _, _, block in given])
+    cells = np.concatenate([[len(row), *row] for row in rows])
+    grid = pyvista.UnstructuredGrid(cells, types.astype(np.uint8), POINTS)
+    grid.save(tmp_path / "a.vtu")
+    found = [lambda: sm.from_pyvista(grid), lambda: sm.read(tmp_path / "a.vtu")]
+    if all(kind for _, kind, _ in given):
+        there = meshio.Mesh(POINTS, [(kind, np.array(block)) for _, kind, block in given])
+        found.append(lambda: sm.from_meshio(there))
+    for make in found:
+        if wanted is None:
+            with pytest.raises((KindError, FileFormatError), match="triangles and"):
+                make()
+            continue
+        mesh = make()
+        ids = mesh.T if isinstance(mesh, sm.TetMesh) else mesh.F
+        corners, expected = mesh.V[ids].tolist(), POINTS[np.array(wanted)].tolist()
+        assert sorted(corners) == sorted(expected)
+        assert (mesh.n_vertices < len(POINTS)) == ("order" in name)
+
+
+def test_surfaces_of_pyvista_with_points_and_lines_beside_the_faces():
+    pyvista = pytest.importorskip("pyvista")
+    there = pyvista.PolyData(POINTS[:5], faces=[3, 0, 1, 2, 4, 0, 1, 3, 4], verts=[1, 4])
+    assert sm.from_pyvista(there).F.tolist() == [[0, 1, 2], [0, 1, 3], [0, 3, 4]]
+    with pytest.raises(KindError, match="no triangles and no tets"):
+        sm.from_pyvista(pyvista.PolyData(POINTS))
+
+
+def test_ids_of_meshio_that_are_whole_numbers_are_taken():
+    meshio = pytest.importorskip("meshio")
+    there = meshio.Mesh(POINTS, [("tetra", np.array(TETS, float))])
+    assert sm.from_meshio(there).T.tolist() == TETS
+    faces = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]]
+    there = meshio.Mesh(POINTS, [("polyhedron4", [[np.array(face) for face in faces]])])
+    with pytest.raises(KindError, match="1 polyhedron4; only"):
+        sm.from_meshio(there)
 
 
 def test_a_missing_library_is_named(surface, monkeypatch):
