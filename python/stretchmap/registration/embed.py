@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..base.torus import wrapped
-from ..mesh.meshes import TetMesh, TriMesh
+from ..mesh.meshes import TetMesh
 from ..mesh.split_edges import SplitSolid
 from .flat_torus import FlatSurface
-from .overlay import overlay_splits
+from .overlay import Splits, overlay_splits
 from .surface_problem import SurfaceProblem
 
 _ROUNDS = 40
@@ -37,16 +36,16 @@ _SHARES = np.concatenate([[0.0], np.linspace(0.1, 0.9, 17), [1.0]])
 
 def unfold_boundary(
     source: TetMesh,
-    y: NDArray[np.float64],
+    flat: FlatSurface,
     bend: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-) -> tuple[SplitSolid, NDArray[np.float64], NDArray[np.intp]]:
+) -> tuple[SplitSolid, FlatSurface, NDArray[np.intp]]:
     """Split boundary edges of the source until a map of the flat torus turns no face over.
 
     Parameters
     ----------
     source : TetMesh
-    y : ndarray, shape (nb, 2)
-        Each boundary vertex in the flat torus, free of folds, faces smaller than half a turn.
+    flat : FlatSurface
+        Its boundary, free of folds.
     bend : callable
         One-to-one map (n, 2) -> (n, 2) of the flat torus, no farther than half a turn.
 
@@ -54,21 +53,19 @@ def unfold_boundary(
     -------
     split : SplitSolid
         The source, refined.
-    bent : ndarray, shape (nb', 2)
-        Each boundary vertex of it after the map.
+    bent : FlatSurface
+        The boundary of that after the map.
     folded : ndarray of intp
         Faces that are still turned over.
     """
     split = SplitSolid.of(source)
     for _ in range(_ROUNDS):
-        F, bent = split.solid.surface.F, bend(y)
-        sides = wrapped(bent[F[:, 1:]] - bent[F[:, :1]])
-        folded = np.flatnonzero(~(np.linalg.det(sides) > 0.0))
-        if not len(folded) or len(y) > (1.0 + _MOST_ADDED) * source.surface.n_vertices:
+        bent = flat.at(bend(flat.turns))
+        folded = np.flatnonzero(~(_core.area.turn_areas(bent.chart, bent.turns) > 0.0))
+        enough = len(flat.turns) > (1.0 + _MOST_ADDED) * source.surface.n_vertices
+        if enough or not len(folded):
             break
-        edges, shares, where = _worst_edges(F[folded], y, bend)
-        split, kept = split.split(split.solid.boundary_vertices[edges], shares)
-        y = np.concatenate([y, where[kept]])
+        split, flat = _split(split, flat, _worst_edges(flat, folded, bend))
     return split, bent, folded
 
 
@@ -95,7 +92,7 @@ class EmbeddedBoundary:
 def embed_boundary(
     source: SplitSolid,
     target: FlatSurface,
-    y: NDArray[np.float64],
+    image: FlatSurface,
     points: NDArray[np.float64],
     held: NDArray[np.int32],
 ) -> EmbeddedBoundary:
@@ -105,9 +102,8 @@ def embed_boundary(
     ----------
     source : SplitSolid
     target : FlatSurface
-    y : ndarray, shape (nb, 2)
-        Image of each boundary vertex in the target's flat torus, free of folds, faces smaller than
-        half a turn.
+    image : FlatSurface
+        Its boundary where it goes in the target's flat torus, free of folds.
     points : ndarray, shape (nb, 3)
         The same on the target's surface.
     held : ndarray of int32
@@ -118,7 +114,7 @@ def embed_boundary(
     for way in (_follow, _overlay):
         if not len(crossings):
             break
-        result = way(start, target, y, held)
+        result = way(start, target, image, held)
         if not len(result.crossings):
             return result
     return start
@@ -127,91 +123,92 @@ def embed_boundary(
 def _follow(
     start: EmbeddedBoundary,
     target: FlatSurface,
-    y: NDArray[np.float64],
+    image: FlatSurface,
     held: NDArray[np.int32],
 ) -> EmbeddedBoundary:
     """New vertices where edges of crossing faces leave the surface most, and room made for them."""
-    split, at, images, crossings = start.split, y, start.points, start.crossings
+    split, points, crossings = start.split, start.points, start.crossings
+    most_vertices = (1.0 + _MOST_ADDED) * len(points)
     fewest, since = len(crossings), 0
-    while len(crossings) and since < _PATIENCE and len(at) < (1.0 + _MOST_ADDED) * len(y):
-        bad = split.solid.surface.F[np.unique(crossings)]
-        edges, shares, where = _worst_edges(bad, at, target.points)
-        split, kept = split.split(split.solid.boundary_vertices[edges], shares)
-        surface, where = split.solid.surface, where[kept]
-        at = np.concatenate([at, where])
-        images = np.concatenate([images, target.points(where)])
-        at, images = _settled(surface, target, at, images, held, len(where))
-        crossings = _core.certificate.crossing_faces(images, surface.F, _MOST_PAIRS)
+    while len(crossings) and since < _PATIENCE and len(points) < most_vertices:
+        bad = _worst_edges(image, np.unique(crossings), target.points)
+        split, image = _split(split, image, bad)
+        n_new = len(image.turns) - len(points)
+        points = np.concatenate([points, target.points(image.turns[-n_new:])])
+        image, points = _settled(image, target, points, held, n_new)
+        crossings = _core.certificate.crossing_faces(points, image.surface.F, _MOST_PAIRS)
         since = 0 if len(crossings) < fewest else since + 1
         fewest = min(fewest, len(crossings))
-    return EmbeddedBoundary(split, images, crossings)
+    return EmbeddedBoundary(split, points, crossings)
 
 
 def _overlay(
     start: EmbeddedBoundary,
     target: FlatSurface,
-    y: NDArray[np.float64],
+    image: FlatSurface,
     held: NDArray[np.int32],
 ) -> EmbeddedBoundary:
     """New vertices where crossing faces meet vertices and edges of the target; all others stay."""
-    split, at, images, crossings = start.split, y, start.points, start.crossings
+    split, points, crossings = start.split, start.points, start.crossings
+    most_vertices = (1.0 + _MOST_ADDED) * len(points)
     most = min(_MOST_PAIRS - 1, _MOST_TIMES * len(crossings))
     for _ in range(_ROUNDS):
-        enough = len(crossings) > most or len(at) > (1.0 + _MOST_ADDED) * len(y)
+        enough = len(crossings) > most or len(points) > most_vertices
         if enough or not len(crossings):
             break
-        edges, shares, where = overlay_splits(
-            split.solid.surface, target, at, images, np.unique(crossings)
-        )
-        if not len(edges):
+        bad = overlay_splits(image, target, points, np.unique(crossings))
+        if not len(bad[0]):
             break
-        split, kept = split.split(split.solid.boundary_vertices[edges], shares)
-        surface, where = split.solid.surface, where[kept]
-        at = np.concatenate([at, where])
-        images = np.concatenate([images, target.points(where)])
-        crossings = _core.certificate.crossing_faces(images, surface.F, _MOST_PAIRS)
-    return EmbeddedBoundary(split, images, crossings)
+        split, image = _split(split, image, bad)
+        points = np.concatenate([points, target.points(image.turns[len(points) :])])
+        crossings = _core.certificate.crossing_faces(points, image.surface.F, _MOST_PAIRS)
+    return EmbeddedBoundary(split, points, crossings)
+
+
+def _split(split: SplitSolid, flat: FlatSurface, wanted: Splits) -> tuple[SplitSolid, FlatSurface]:
+    """A solid and its boundary with new vertices on edges of the latter."""
+    edges, shares, where = wanted
+    split, kept = split.split(split.solid.boundary_vertices[edges], shares)
+    return split, flat.split(split.solid.surface, edges[kept], where[kept])
 
 
 def _settled(
-    surface: TriMesh,
+    image: FlatSurface,
     target: FlatSurface,
-    y: NDArray[np.float64],
     points: NDArray[np.float64],
     held: NDArray[np.int32],
     n_new: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[FlatSurface, NDArray[np.float64]]:
     """The last ``n_new`` vertices and those near them moved for less distortion, one by one.
 
     What is straight in the flat torus is crooked on the surface; left there, the new vertices would
     make the image more crooked, not less.
     """
-    edges = surface.edges
+    edges, y = image.surface.edges, image.turns
     loose = np.zeros(len(y), bool)
     loose[-n_new:] = True
     for _ in range(_NEAR):
         loose[edges[loose[edges].any(axis=1)]] = True
     loose[held] = False
-    problem = SurfaceProblem(FlatSurface.at(surface, y), target)
+    problem = SurfaceProblem(image, target)
     problem.held = ~loose
     for _ in range(_SETTLE):
         y, points = problem.one_by_one(y, points)
-    return y, points
+    return image.at(y), points
 
 
 def _worst_edges(
-    F: NDArray[np.int32],
-    y: NDArray[np.float64],
+    flat: FlatSurface,
+    faces: NDArray[np.intp],
     place: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """The edge of each face whose image under ``place`` strays most from its chord, and where.
-
-    Returns edges (e, 2), worst first and none twice; shares (e,) of the way from their first end;
-    positions (e, 2) in the flat torus.
+) -> Splits:
+    """The edge of each of some faces whose image under ``place`` strays most from its chord, and
+    where; worst first, none twice.
     """
+    F = flat.surface.F[faces]
     edges = np.sort(F[:, [[0, 1], [1, 2], [2, 0]]], axis=2)  # (m, 3, 2)
-    start = y[edges[..., 0]][:, :, None]
-    way = start + _SHARES[:, None] * wrapped(y[edges[..., 1]][:, :, None] - start)
+    start = flat.turns[edges[..., 0]][:, :, None]
+    way = start + _SHARES[:, None] * flat.ways(edges)[:, :, None]
     there = place(way.reshape(-1, 2)).reshape(*way.shape[:3], -1)
     first, last = there[:, :, :1], there[:, :, -1:]
     strays = np.linalg.norm(there - first - _SHARES[:, None] * (last - first), axis=3)

@@ -71,19 +71,56 @@ class FlatSurface:
         turns = _least_distorted(surface, chart, conformal.lattice, np.ascontiguousarray(turns))
         return cls(surface, conformal.forms, turns)
 
-    @classmethod
-    def at(cls, surface: TriMesh, turns: NDArray[np.float64]) -> FlatSurface:
-        """The surface where ``turns`` (n, 2) puts it, every edge shorter than half a turn."""
-        edges = surface.edges
-        forms = -np.round(turns[edges[:, 1]] - turns[edges[:, 0]]).T
-        return cls(surface, np.ascontiguousarray(forms, np.int32), np.ascontiguousarray(turns))
-
     def changed(self, gauge: Gauge) -> FlatSurface:
         """The same surface in coordinates changed by a gauge."""
         matrix = gauge.matrix
         forms = np.ascontiguousarray(matrix @ self.forms, np.int32)
         turns = self.turns @ matrix.T + gauge.shift
         return FlatSurface(self.surface, forms, np.ascontiguousarray(turns))
+
+    def at(self, turns: NDArray[np.float64]) -> FlatSurface:
+        """The same surface, its vertices moved to (n, 2) ``turns`` without being wrapped."""
+        return FlatSurface(self.surface, self.forms, np.ascontiguousarray(turns))
+
+    def split(
+        self, finer: TriMesh, edges: NDArray[np.int32], where: NDArray[np.float64]
+    ) -> FlatSurface:
+        """The surface some of whose edges were split, of each face one at most.
+
+        Parameters
+        ----------
+        finer : TriMesh
+            Its first n vertices are those of the surface, then one on each of ``edges``.
+        edges : ndarray of int32, shape (a, 2)
+        where : ndarray, shape (a, 2)
+            The new vertices, in turns, as seen from the first end of their edges.
+        """
+        n = self.surface.n_vertices
+        low, high = finer.edges.T
+        # A new vertex lies where the first end of its edge sees it, so that is where others see it.
+        first = edges[np.maximum(high - n, 0), 0] if len(edges) else high
+        last = np.where(high < n, high, first)
+        forms = np.zeros((2, len(low)), np.int32)
+        apart = low != last
+        forms[:, apart] = self._whole(low[apart], last[apart]).T
+        return FlatSurface(finer, forms, np.concatenate([self.turns, where]))
+
+    def ways(self, ends: NDArray[np.int32]) -> NDArray[np.float64]:
+        """(..., 2) ways in turns along edges, given by their first and last vertex (..., 2)."""
+        first, last = ends[..., 0], ends[..., 1]
+        return np.asarray(self.turns[last] - self.turns[first] + self._whole(first, last))
+
+    def corners(self, faces: NDArray[np.integer]) -> NDArray[np.float64]:
+        """(k, 3, 2) corners of some faces in turns, as seen from the first of each."""
+        shift = np.stack([self.chart.shift_u, self.chart.shift_v], axis=-1)[faces]
+        return np.asarray(self.turns[self.surface.F[faces]] + shift)
+
+    def _whole(self, first: NDArray[np.int32], last: NDArray[np.int32]) -> NDArray[np.int32]:
+        """(..., 2) whole turns along edges, values of the forms."""
+        n, edges = self.surface.n_vertices, self.surface.edges.astype(np.int64)
+        key = np.minimum(first, last).astype(np.int64) * n + np.maximum(first, last)
+        along = self.forms.T[np.searchsorted(edges[:, 0] * n + edges[:, 1], key)]
+        return np.where((first < last)[..., None], along, -along)
 
     @cached_property
     def chart(self) -> _core.area.SurfaceChart:
@@ -126,8 +163,7 @@ class FlatSurface:
     def face_slopes(self) -> NDArray[np.float64]:
         """(m, 6) derivatives of `points` in each face; row-major 3x2 matrices."""
         F, V = self.surface.F, self.surface.V
-        shift = np.stack([self.chart.shift_u, self.chart.shift_v], axis=-1)
-        flat = self.turns[F] + shift
+        flat = self.corners(np.arange(len(F)))
         flat_edges = np.stack([flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]], axis=-1)
         edges = np.stack([V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]], axis=-1)
         return np.ascontiguousarray((edges @ np.linalg.inv(flat_edges)).reshape(-1, 6))

@@ -201,11 +201,11 @@ def _boundary_map(
     match = match_surfaces(
         first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
     )
-    y, points, split = match.y, match.points, SplitSolid.of(source)
+    image, points, split = first.at(match.y), match.points, SplitSolid.of(source)
     if landmark_map == "affine":
-        starts, ends = y[pairs[:, 0]], second.turns[pairs[:, 1]]
-        split, y, folded = unfold_boundary(
-            source, y, lambda at: affine_landmark_map(starts, ends, at)
+        starts, ends = image.turns[pairs[:, 0]], second.turns[pairs[:, 1]]
+        split, image, folded = unfold_boundary(
+            source, image, lambda at: affine_landmark_map(starts, ends, at)
         )
         if len(folded):
             raise SolverError(
@@ -213,9 +213,9 @@ def _boundary_map(
                 "and refining them does not help; use landmark_map='smooth'",
                 folded,
             )
-        points = second.points(y)
+        points = second.points(image.turns)
     points[pairs[:, 0]] = second.surface.V[pairs[:, 1]]
-    return embed_boundary(split, second, y, points, pairs[:, 0]), gauge, match.history
+    return embed_boundary(split, second, image, points, pairs[:, 0]), gauge, match.history
 
 
 def _fill(

@@ -12,8 +12,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.torus import wrapped
-from ..mesh.meshes import TriMesh
 from .flat_torus import FlatSurface
 
 _SAMPLES = 19  # of an edge; the crossings next to them are found
@@ -25,9 +23,8 @@ Splits = tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]
 
 
 def overlay_splits(
-    surface: TriMesh,
+    image: FlatSurface,
     target: FlatSurface,
-    y: NDArray[np.float64],
     points: NDArray[np.float64],
     faces: NDArray[np.intp],
 ) -> Splits:
@@ -39,12 +36,10 @@ def overlay_splits(
 
     Parameters
     ----------
-    surface : TriMesh
-    target : FlatSurface
-    y : ndarray, shape (n, 2)
-        Vertices of ``surface`` in the flat torus of ``target``, faces smaller than half a turn.
+    image, target : FlatSurface
+        Both in the flat torus of the latter.
     points : ndarray, shape (n, 3)
-        The same on the target's surface.
+        Vertices of the former on the target's surface.
     faces : ndarray of intp, shape (k,)
         Ascending.
 
@@ -55,11 +50,11 @@ def overlay_splits(
     shares : ndarray, shape (e,)
         Where to split the source, as a share of the way from the first end.
     where : ndarray, shape (e, 2)
-        The new vertices in the flat torus.
+        The new vertices in the flat torus, as seen from the first end.
     """
     exact = _EXACT * float(np.linalg.norm(np.ptp(target.surface.V, axis=0)))
-    by_vertex = _at_target_vertices(surface, target, y, points, faces, exact)
-    by_edge = _at_crossings(surface, target, y, points, faces, exact)
+    by_vertex = _at_target_vertices(image, target, points, faces, exact)
+    by_edge = _at_crossings(image, target, points, faces, exact)
     edges = np.concatenate([by_vertex[0], by_edge[0]])
     shares = np.concatenate([by_vertex[1], by_edge[1]])
     where = np.concatenate([by_vertex[2], by_edge[2]])
@@ -69,24 +64,22 @@ def overlay_splits(
 
 
 def _at_crossings(
-    surface: TriMesh,
+    image: FlatSurface,
     target: FlatSurface,
-    y: NDArray[np.float64],
     points: NDArray[np.float64],
     faces: NDArray[np.intp],
     exact: float,
 ) -> Splits:
     """The longest edge of each face that leaves the surface, where it does so most."""
-    sides = np.sort(surface.F[faces][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    sides = np.sort(image.surface.F[faces][:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     edges, index = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
-    start = y[edges[:, 0]]
-    way = wrapped(y[edges[:, 1]] - start)
+    start, way = image.turns[edges[:, 0]], image.ways(edges)
     samples = np.tile(np.linspace(0.0, 1.0, _SAMPLES), (len(edges), 1))
     found, weights = target.locate(
         (start[:, None] + samples[..., None] * way[:, None]).reshape(-1, 2)
     )
     # Where the line enters and leaves the target faces found.
-    corners = _unwrapped_corners(target, found)
+    corners = target.corners(found)
     inverse = np.linalg.inv(np.stack([corners[:, k] - corners[:, 0] for k in (1, 2)], axis=-1))
     change = np.einsum("nij,nj->ni", inverse, np.repeat(way, _SAMPLES, axis=0))
     change = np.column_stack([-change.sum(axis=1), change])
@@ -113,33 +106,32 @@ def _at_crossings(
 
 
 def _at_target_vertices(
-    surface: TriMesh,
+    image: FlatSurface,
     target: FlatSurface,
-    y: NDArray[np.float64],
     points: NDArray[np.float64],
     faces: NDArray[np.intp],
     exact: float,
 ) -> Splits:
     """The target vertex farthest from each face it lies in, put on one of the face's edges."""
-    F = surface.F
-    home, weights = FlatSurface.at(surface, y).locator.locate(target.turns)
+    F = image.surface.F
+    home, weights = image.locator.locate(target.turns)
     inside = np.isin(home, faces) & (weights.min(axis=1) > 1e-9)
     v = np.flatnonzero(inside)
     f, weights = home[v], weights[v]
-    image = np.einsum("ij,ijk->ik", weights, points[F[f]])
-    far = np.linalg.norm(target.surface.V[v] - image, axis=1)
+    there = np.einsum("ij,ijk->ik", weights, points[F[f]])
+    far = np.linalg.norm(target.surface.V[v] - there, axis=1)
     order = np.lexsort((-far, f))
     order = order[np.diff(f[order], prepend=-1) > 0]
     order = order[far[order] > exact]
     v, f, weights, far = v[order], f[order], weights[order], far[order]
     # The edge that leaves the largest of the four parts the smallest: the vertex need not be on it.
-    corners = y[F[f, 0]][:, None] + wrapped(y[F[f]] - y[F[f, :1]])
+    corners = image.corners(f)
     t = np.einsum("ij,ijk->ik", weights, corners)
-    across = _across(F, len(y))[f]
+    across = _across(F, len(points))[f]
     parts = np.empty((len(v), 3))
     for k in range(3):
         a, b, c = (corners[:, (k + j) % 3] for j in range(3))
-        d = a + wrapped(y[across[:, k]] - a)
+        d = a + image.ways(np.stack([F[f, k], across[:, k]], axis=-1))
         here = np.minimum(_area(a, t, c), _area(t, b, c)) / _area(a, b, c)
         there = np.minimum(_area(t, a, d), _area(b, t, d)) / _area(b, a, d)
         parts[:, k] = np.minimum(here, there)
@@ -152,7 +144,8 @@ def _at_target_vertices(
     share = np.stack([weights[n, side], weights[n, (side + 1) % 3]], axis=1)
     up = np.argsort(ends, axis=1)
     ends, share = np.take_along_axis(ends, up, axis=1), np.take_along_axis(share, up, axis=1)
-    return ends, share[:, 1] / share.sum(axis=1), t[rows]
+    seen = image.turns[ends[:, 0]] - corners[rows, (side + up[:, 0]) % 3]
+    return ends, share[:, 1] / share.sum(axis=1), t[rows] + seen
 
 
 def _across(F: NDArray[np.int32], n: int) -> NDArray[np.int32]:
@@ -161,11 +154,6 @@ def _across(F: NDArray[np.int32], n: int) -> NDArray[np.int32]:
     key, twin = (first * n + second).ravel(), (second.astype(np.int64) * n + first).ravel()
     order = np.argsort(key)
     return np.roll(F, 1, axis=1).ravel()[order[np.searchsorted(key[order], twin)]].reshape(F.shape)
-
-
-def _unwrapped_corners(target: FlatSurface, faces: NDArray[np.int32]) -> NDArray[np.float64]:
-    shift = np.stack([target.chart.shift_u, target.chart.shift_v], axis=-1)[faces]
-    return target.turns[target.surface.F[faces]] + shift
 
 
 def _area(

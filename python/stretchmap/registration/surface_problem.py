@@ -116,8 +116,7 @@ class SurfaceProblem:
 def _samples(target: FlatSurface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centers (m, 2) of the faces in the flat torus, and row-major 2x2 matrices (m, 4) that take
     the flat torus to the plane of each."""
-    shift = np.stack([target.chart.shift_u, target.chart.shift_v], axis=-1)
-    centers = (target.turns[target.surface.F] + shift).mean(axis=1)
+    centers = target.corners(np.arange(target.surface.n_faces)).mean(axis=1)
     slopes = target.face_slopes.reshape(-1, 3, 2)
     squares = np.einsum("nij,nik->njk", slopes, slopes)
     metric = np.linalg.cholesky(squares).transpose(0, 2, 1)

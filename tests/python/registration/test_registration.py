@@ -321,12 +321,13 @@ def test_saving(registered, tmp_path):
 def test_a_boundary_image_that_crosses_itself_is_refined():
     """Chords of a coarse polygon leave the thin wall on the other side."""
     source, target = samples.solid_torus(400), FlatSurface.of(thin_wall(0.02).surface)
-    y = FlatSurface.of(source.surface).turns
+    flat = FlatSurface.of(source.surface)
+    y = flat.turns
     y = y + np.stack([0.04 * np.cos(2 * np.pi * y[:, 1]), 0.0 * y[:, 1]], axis=1)
     points, n = target.points(y), len(y)
     assert len(_core.certificate.crossing_faces(points, source.surface.F, 1000)) > 50
     held = np.arange(0, n, 20, dtype=np.int32)
-    result = embed_boundary(SplitSolid.of(source), target, y, points, held)
+    result = embed_boundary(SplitSolid.of(source), target, flat.at(y), points, held)
     solid = result.split.solid
     surface = solid.surface
     assert not len(result.crossings)
@@ -341,7 +342,8 @@ def test_a_boundary_image_that_crosses_itself_is_refined():
 
 def test_faces_that_the_affine_map_turns_over_are_refined():
     source = samples.solid_torus(3000)
-    y = FlatSurface.of(source.surface).turns
+    flat = FlatSurface.of(source.surface)
+    y = flat.turns
 
     def shear(at):  # one to one, with a kink that coarse faces do not follow
         across = 3.0 * (at[:, 1] - at[:, 0])
@@ -349,10 +351,10 @@ def test_faces_that_the_affine_map_turns_over_are_refined():
 
     faces = source.surface.F
     assert (flat_areas(shear(y), faces) <= 0.0).any()
-    split, bent, folded = unfold_boundary(source, y, shear)
+    split, bent, folded = unfold_boundary(source, flat, shear)
     solid = split.solid
-    assert not len(folded) and (flat_areas(bent, solid.surface.F) > 0.0).all()
-    assert np.array_equal(bent[: len(y)], shear(y))
+    assert not len(folded) and (flat_areas(bent.turns, solid.surface.F) > 0.0).all()
+    assert np.array_equal(bent.turns[: len(y)], shear(y))
     assert solid.diagnose().ok and solid.volume == pytest.approx(source.volume, rel=1e-12)
 
 
@@ -420,25 +422,61 @@ def test_contradicting_landmarks_name_the_pair_with_the_smooth_map_too(pair):
 def test_faces_cut_along_the_target_end_on_its_surface():
     """Cut all faces as long as there is anything to cut: the image is the target, face for face."""
     source, target = samples.solid_torus(400), FlatSurface.of(samples.bumpy_torus(1500).surface)
-    y = FlatSurface.of(source.surface).turns + np.array([0.013, 0.17])
-    n, points, solid = len(y), target.points(y), source
+    image = FlatSurface.of(source.surface)
+    image = image.at(image.turns + np.array([0.013, 0.17]))
+    points, solid = target.points(image.turns), source
     gap = [abs(_core.mesh.enclosed_volume(points, source.surface.F) / target.surface.volume - 1.0)]
     for _ in range(60):
         faces = np.arange(solid.surface.n_faces)
-        edges, shares, where = overlay_splits(solid.surface, target, y, points, faces)
+        edges, shares, where = overlay_splits(image, target, points, faces)
         if not len(edges):
             break
         split = split_edges(solid, solid.boundary_vertices[edges], shares)
-        solid, y = split.solid, np.concatenate([y, where[split.kept]])
-        points = target.points(y)
-        assert (flat_areas(y, solid.surface.F) > 0.0).all()
+        solid = split.solid
+        image = image.split(solid.surface, edges[split.kept], where[split.kept])
+        points = target.points(image.turns)
+        assert (flat_areas(image.turns, solid.surface.F) > 0.0).all()
         gap.append(
             abs(_core.mesh.enclosed_volume(points, solid.surface.F) / target.surface.volume - 1.0)
         )
     assert not len(edges) and gap[0] > 1e-2 and gap[-1] < 1e-9
-    image = TriMesh(points, solid.surface.F)
-    assert image.area == pytest.approx(target.surface.area, rel=1e-9)
-    assert np.array_equal(solid.V[: source.n_vertices], source.V) and len(y) > n
+    there = TriMesh(points, solid.surface.F)
+    assert there.area == pytest.approx(target.surface.area, rel=1e-9)
+    assert np.array_equal(solid.V[: source.n_vertices], source.V)
+    assert solid.n_vertices > source.n_vertices
+
+
+def test_edges_longer_than_half_a_turn_are_split_where_they_run():
+    """A Dehn twist or two make edges of the finest torus as long as that."""
+    solid = samples.solid_torus(400)
+    flat = FlatSurface.of(solid.surface)
+    twisted = flat.changed(Gauge(1, 9, (0.3, 0.6), 0.0, ""))
+    edges = solid.surface.edges[::5]
+    ways = twisted.ways(edges)
+    assert np.abs(ways).max() > 0.5
+    assert np.allclose(twisted.ways(edges[:, ::-1]), -ways, atol=1e-12)
+    split, kept = SplitSolid.of(solid).split(
+        solid.boundary_vertices[edges], np.full(len(edges), 0.3)
+    )
+    where = twisted.turns[edges[kept, 0]] + 0.3 * ways[kept]
+    finer = twisted.split(split.solid.surface, edges[kept], where)
+    areas = _core.area.turn_areas(finer.chart, finer.turns)  # of a form that is closed
+    assert areas.min() > 0.0 and areas.sum() == pytest.approx(1.0, rel=1e-12)
+    # Taken back, it is what the surface split without a twist is.
+    plain = flat.split(
+        split.solid.surface, edges[kept], flat.turns[edges[kept, 0]] + 0.3 * flat.ways(edges[kept])
+    )
+    assert np.allclose(
+        finer.ways(finer.surface.edges), plain.ways(finer.surface.edges) @ [[1, 9], [0, 1]]
+    )
+
+
+def test_mirrored_landmarks_that_fold_no_face_stretch_edges_beyond_half_a_turn():
+    pair = samples.vertebra_pair(n_landmarks=8, n_tets=(800, 1000))
+    mirrored = TetMesh(pair.target.V * [-1, 1, 1], pair.target.T, orient=True)
+    marks = pair.source_landmarks, pair.target_landmarks
+    result = register(pair.source, mirrored, marks, boundary="frozen", keep_best=True)
+    assert result.landmark_error < 1e-12
 
 
 def test_crossing_faces_are_cut_along_the_target_where_following_it_fails(monkeypatch):
