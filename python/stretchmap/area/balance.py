@@ -27,7 +27,7 @@ _GROWTH, _MOST_WEIGHT = 4.0, 64.0  # of the area term against it
 _REACH, _MOST_REACH = 4.0, 1e6  # factors of area asked for in one step
 _LONG, _FULL = 0.5, 0.9  # steps that let the weight, the reach grow
 _NEARLY = 0.95  # share of the area within reach from which on the weight grows
-_FAIR = 0.1  # face SD the polyhedral steps can start from
+FAIR = 0.1  # face SD the polyhedral steps can start from
 _SETTLED = 0.02  # share of the energy; a step that lowers it by less was the last
 # So many steps in a row that end above the lowest energy so far, less that share, are the last as
 # well: weights follow the areas, and both can go round in circles.
@@ -79,7 +79,7 @@ def balance_areas(
         if taken.within > 1.0 - 1e-9:
             since = 0 if taken.after < (1.0 - _SETTLED) * lowest else since + 1
             lowest = min(lowest, taken.after)
-            if done or since == _CIRCLING or measured.face_std < _FAIR:
+            if done or since == _CIRCLING or measured.face_std < FAIR:
                 break
         if taken.step > _LONG and taken.within > _NEARLY and shape > lightest:
             shape, lowest, since = max(shape / _GROWTH, lightest), math.inf, 0

@@ -115,7 +115,8 @@ def area_map(
     Returns
     -------
     AreaMap
-        ``converged`` is False, and a warning logged, if ``tol`` was not reached.
+        ``converged`` is False, and a warning logged, if ``tol`` was not reached; with
+        ``finish="none"``, if the stretch energy is not at rest.
 
     Raises
     ------

@@ -15,12 +15,12 @@ from .. import _core
 from ..base.budget import Budget
 from ..base.progress import Progress
 from ..maps.history import IterationRecord
-from .balance import JAMMED, STEPS, balance_areas
+from .balance import FAIR, JAMMED, STEPS, balance_areas
 from .coarse import Folded, Level
 from .finish import FEW_UNFOLD_STEPS, Pace, Steps, finish_areas, unfolded
 from .flat import start_angles
 from .search import Ratio, search_phase
-from .sem import minimize_stretch
+from .sem import at_rest, minimize_stretch
 from .work import Work
 
 _log = logging.getLogger("stretchmap")
@@ -52,8 +52,8 @@ class Made:
     phase: float
     ratio: float
     history: list[IterationRecord]
-    converged: bool = True
-    reason: str = "stretch energy at rest"
+    converged: bool = False
+    reason: str = ""
     seconds: dict[str, float] = field(default_factory=dict)
 
     def add(self, records: list[IterationRecord], finest: bool) -> None:
@@ -151,6 +151,7 @@ def _climb(
     made.add(records, len(stack) == 1)
     made.seconds = {"sem": middle - clock, "phase": time.perf_counter() - middle}
     if route.finish == "none":
+        made.converged, made.reason = _unfinished(records)
         return made
     clock = time.perf_counter()
     # What the chart's solves used is in pieces, and the factors to come are large.
@@ -199,6 +200,17 @@ def best_turns(
         if route.shape or other[-1] < found[-1]:
             return balanced, other, history + records
     return turns, found, history
+
+
+def _unfinished(records: list[IterationRecord]) -> tuple[bool, str]:
+    """Whether the chart is what its steps lead to, and in words."""
+    last = records[-1]
+    if last.stage == "balance":
+        fair = last.element_std < FAIR
+        return fair, f"areas in the chart are {'nearly' if fair else 'not nearly'} equal"
+    if at_rest(records):
+        return True, "stretch energy at rest"
+    return False, f"stretch energy not at rest after step {last.iteration}, see sem_iter"
 
 
 def _of_coarse(record: IterationRecord) -> IterationRecord:

@@ -17,6 +17,8 @@ from .coarse import Level
 
 _log = logging.getLogger("stretchmap")
 
+_REST = 1e-4  # share of the energy; a step that lowers it by no more was the last
+
 
 def minimize_stretch(
     level: Level, max_iter: int, progress: Progress | None
@@ -48,6 +50,12 @@ def minimize_stretch(
             )
         )
         report(progress, "area", iteration, max_iter, energy=measured.energy, flips=measured.flips)
-        if iteration and history[-2].energy - measured.energy <= 1e-4 * measured.energy:
+        if at_rest(history):
             break
     return sem.turns, history
+
+
+def at_rest(history: list[IterationRecord]) -> bool:
+    """Whether the last step did not lower the energy any more."""
+    before, last = history[-2:] if len(history) > 1 else (None, history[-1])
+    return before is not None and before.energy - last.energy <= _REST * last.energy

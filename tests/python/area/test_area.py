@@ -259,6 +259,17 @@ def test_options_out_of_range(bumpy: TriMesh, options: dict) -> None:
         area_map(bumpy, **options)
 
 
+def test_a_chart_has_converged_where_its_energy_is_at_rest(bumpy: TriMesh, caplog) -> None:
+    for sem_iter in (0, 1):
+        result = area_map(bumpy, finish="none", sem_iter=sem_iter)
+        assert not result.converged and f"after step {sem_iter}" in result.stop_reason
+        assert result.stop_reason in caplog.text
+    caplog.clear()
+    result = area_map(bumpy, finish="none", sem_iter=100)
+    before, last = (record.energy for record in result.history[-2:])
+    assert result.converged and 0.0 <= before - last <= 1e-4 * last and not caplog.text
+
+
 def test_sphere_is_refused() -> None:
     octahedron = np.concatenate([np.eye(3), -np.eye(3)])
     faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
