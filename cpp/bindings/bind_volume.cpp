@@ -49,14 +49,16 @@ void bind_stretch(py::module_& m) {
 
 void bind_newton(py::module_& m) {
   py::class_<EnergyWeights>(m, "EnergyWeights")
-      .def(py::init([](double shape, double volume, double epsilon, double face) {
-             return EnergyWeights{shape, volume, epsilon, face};
+      .def(py::init([](double shape, double volume, double epsilon, double face, double soft) {
+             return EnergyWeights{shape, volume, epsilon, soft, face};
            }),
-           py::arg("shape"), py::arg("volume"), py::arg("epsilon") = 0.0, py::arg("face") = 0.0)
+           py::arg("shape"), py::arg("volume"), py::arg("epsilon") = 0.0, py::arg("face") = 0.0,
+           py::arg("soft") = 0.0)
       .def_readonly("face", &EnergyWeights::face)
       .def_readonly("shape", &EnergyWeights::shape)
       .def_readonly("volume", &EnergyWeights::volume)
-      .def_readonly("epsilon", &EnergyWeights::epsilon);
+      .def_readonly("epsilon", &EnergyWeights::epsilon)
+      .def_readonly("soft", &EnergyWeights::soft);
   py::class_<EnergyReport>(m, "EnergyReport")
       .def_readonly("energy", &EnergyReport::energy)
       .def_readonly("min_det", &EnergyReport::min_det)

@@ -67,10 +67,11 @@ struct Terms {
   alignas(64) Lane b, b1, b2;
 };
 
-STRETCHMAP_INLINE void terms(const Lane& det, const EnergyWeights& w, Terms& t) {
+STRETCHMAP_INLINE void terms(const Lane& det, const Lane& own, const EnergyWeights& w, Terms& t) {
   alignas(64) Lane chi, chi1, chi2, root;
+  const double square = w.epsilon > 0.0 ? w.epsilon * w.epsilon : 0.0;
   for (int l = 0; l < kLanes; ++l) {
-    const Regularized r = regularized(det[l], w.epsilon);
+    const Regularized r = regularized_by_square(det[l], square > 0.0 ? square + own[l] : 0.0);
     chi[l] = r.value;
     chi1[l] = r.first;
     chi2[l] = r.second;
@@ -188,7 +189,7 @@ void element_values(ElementBatch& batch, const EnergyWeights& w) {
   Jacobians j;
   Terms t;
   jacobians(batch, j);
-  terms(j.det, w, t);
+  terms(j.det, batch.own, w, t);
   energies(batch, w, j, t);
 }
 
@@ -197,7 +198,7 @@ void element_gradients(ElementBatch& batch, const EnergyWeights& w) {
   Jacobians j;
   Terms t;
   jacobians(batch, j);
-  terms(j.det, w, t);
+  terms(j.det, batch.own, w, t);
   energies(batch, w, j, t);
   alignas(64) Lane slope;  // d psi / dD
   for (int l = 0; l < kLanes; ++l) slope[l] = t.a1[l] * j.squared[l] + t.b1[l];
@@ -209,7 +210,7 @@ void element_models(ElementBatch& batch, const EnergyWeights& w) {
   Jacobians j;
   Terms t;
   jacobians(batch, j);
-  terms(j.det, w, t);
+  terms(j.det, batch.own, w, t);
   energies(batch, w, j, t);
   alignas(64) Lane slope;  // d psi / dD
   for (int l = 0; l < kLanes; ++l) slope[l] = t.a1[l] * j.squared[l] + t.b1[l];

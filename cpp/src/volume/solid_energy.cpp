@@ -44,6 +44,7 @@ void SolidEnergy::for_batches(const PointsRef& x, const EnergyWeights& w, Index 
                               void (*evaluate)(ElementBatch&, const EnergyWeights&),
                               const Item& item, const Visit& visit) const {
   ElementBatch batch;
+  const bool soft = own_.size() > 0;
   for (Index begin = first; begin < last; begin += kLanes) {
     for (int l = 0; l < kLanes; ++l) {
       const Index t = item(std::min(begin + l, last - 1));
@@ -54,6 +55,7 @@ void SolidEnergy::for_batches(const PointsRef& x, const EnergyWeights& w, Index 
       }
       for (int k = 0; k < 9; ++k) batch.rest[k][l] = rest_(t, k);
       batch.weight[l] = weights_[t];
+      if (soft) batch.own[l] = own_[t];
     }
     evaluate(batch, w);
     for (int l = 0; l < kLanes && begin + l < last; ++l) visit(item(begin + l), l, batch);
@@ -68,6 +70,22 @@ void SolidEnergy::set_targets(const VecRef& target) {
     rest_.row(t) *= std::cbrt(target_[t] / wanted);
     target_[t] = wanted;
   });
+}
+
+void SolidEnergy::soften(const PointsRef& x, double share) {
+  own_.resize(0);
+  if (!(share > 0.0)) return;
+  const Index k = static_cast<Index>(tets_.rows());
+  Vec own(k);
+  for_chunks(k, kElementChunk, [&](Index begin, Index end) {
+    for_batches(
+        x, {1.0, 1.0, 1.0}, begin, end, element_values, [](Index t) { return t; },
+        [&](Index t, int lane, const ElementBatch& batch) {
+          const double inverted = share * std::min(batch.det[lane], 0.0);
+          own[t] = inverted * inverted;
+        });
+  });
+  own_ = std::move(own);
 }
 
 SolidEnergy::Energies SolidEnergy::energies(const PointsRef& x, const EnergyWeights& w) const {

@@ -213,7 +213,7 @@ bool SolidNewton::solve_projected(const PointsRef& x, EnergyWeights w, const New
 EnergyReport SolidNewton::start_value(const PointsRef& x, const EnergyWeights& w) {
   const EnergyWeights& last = end_weights_;
   const bool same = w.shape == last.shape && w.volume == last.volume && w.face == last.face &&
-                    w.epsilon == last.epsilon;
+                    w.epsilon == last.epsilon && w.soft == 0.0 && last.soft == 0.0;
   return same && end_.rows() == x.rows() && end_ == x ? end_report_ : energy_.value(x, w);
 }
 
@@ -223,6 +223,7 @@ NewtonReport SolidNewton::step(Points& x, const EnergyWeights& weights,
   EnergyWeights w = weights;
   w.negative = projected_ > 0 ? 0.0 : options.negative;
   if (projected_ > 0 && !options.keep_hessian) --projected_;
+  energy_.soften(x, w.epsilon > 0.0 ? w.soft : 0.0);
   report.before = report.after = start_value(x, w);
   if (!std::isfinite(report.before.energy))
     throw Error("SolverError", "the energy is infinite: " + std::to_string(report.before.flips) +

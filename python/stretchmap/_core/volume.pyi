@@ -15,7 +15,7 @@ class VolumetricStretch:
     def backend(self) -> str:
         ...
 class EnergyWeights:
-    def __init__(self, shape: typing.SupportsFloat | typing.SupportsIndex, volume: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.0, face: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, shape: typing.SupportsFloat | typing.SupportsIndex, volume: typing.SupportsFloat | typing.SupportsIndex, epsilon: typing.SupportsFloat | typing.SupportsIndex = 0.0, face: typing.SupportsFloat | typing.SupportsIndex = 0.0, soft: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     @property
     def epsilon(self) -> float:
@@ -25,6 +25,9 @@ class EnergyWeights:
         ...
     @property
     def shape(self) -> float:
+        ...
+    @property
+    def soft(self) -> float:
         ...
     @property
     def volume(self) -> float:

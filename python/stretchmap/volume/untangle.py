@@ -35,16 +35,19 @@ __all__ = [
 ]
 
 # Epsilon: determinants are 1 where all is well, a larger one tells nothing apart. But where some
-# are inverted to many times that, one of 1 hides all others behind them, and steps are short; in
-# patches, where nothing else turns over for it, it is as wide as they ask for. Down to the narrow
-# one more tets turn over than had been inverted, which shows nothing.
-_WIDEST, _WIDEST_FROM_AFAR, _NARROW = 1.0, 20.0, 0.1
+# are inverted to many times that, one of 1 makes steps short; in patches, where nothing else turns
+# over for it, it is as wide as they ask for. Down to the narrow one more tets turn over than had
+# been inverted, which shows nothing.
+_WIDEST, _WIDEST_SOFT, _NARROW = 1.0, 5.0, 0.1
+# Share of its determinant that the epsilon of an inverted tet is at least. With one epsilon for all
+# those inverted farthest have nearly all of the energy, and single ones hold up every step; with a
+# share of 1 the others' shapes outweigh them, and they stay where they are.
+_SOFT = 0.2
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
-# whole steps follow with ease and a few tets are left after some settled ones; in haste or from
-# afar as long as epsilon is not narrow. Faces that glide are not hurried: single ones stay folded
-# then.
+# whole steps follow with ease, in patches after some settled ones. Faces that glide are not
+# hurried: single ones stay folded then.
 _SLOW, _SWIFT, _DRAGS = 0.9, 0.7, 2
 _BETTER = 1.05
 # Inverted elements, of those there were, that are progress in haste: patches are quicker than a
@@ -63,8 +66,7 @@ _FEW_PATIENCE = 4
 # served better by patches.
 MOST_STUCK, _HASTY_PATIENCE = 0.05, 10
 _PATCH_STEPS, _PATCH_PATIENCE = 150, 40
-# Times the volume a tet may expect: what is that large, or inverted to that size, has most of the
-# energy and holds up all steps for the whole.
+# Times the volume a tet may expect: what is that large has most of the energy.
 _FAR = 100.0
 # Steps in a row, none longer than that and none with fewer inverted elements than there had been:
 # a few of them are so far off that all others wait for them.
@@ -118,6 +120,7 @@ def _continue(
     steps: int,
     enough: Callable[[int, int, float], bool],
     hasty: bool = False,
+    soft: float = 0.0,
     widest: float = _WIDEST,
     linear: _core.volume.NewtonOptions,
     budget: Budget,
@@ -129,7 +132,7 @@ def _continue(
     state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
     left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
     # A better worst tet is not worth turning others over for long, nor many steps.
-    clean, from_afar = left == 0, widest > _WIDEST
+    clean = left == 0
     steps = min(steps, _AWAY) if clean else steps
     epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), widest)
     patience = Patience(left, worst)
@@ -141,23 +144,21 @@ def _continue(
             break
         if hasty and short == _JAMMED:
             break
-        weights = _core.volume.EnergyWeights(1.0, 1.0, epsilon, face)
+        weights = _core.volume.EnergyWeights(1.0, 1.0, epsilon, face, soft)
         x, step = newton.step(x, weights, linear)
         before, after = step.before.energy, step.after
         if note is not None:
             note(iteration, x, step, epsilon)
         left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
         settled = before - after.energy <= _SETTLED * (before + 2.0)
-        wide = from_afar and epsilon > _NARROW
-        patience = Patience() if wide else patience
+        patience = Patience() if soft and epsilon > _NARROW else patience
         patience.note(left, worst, settled, _FEWER if hasty else 1.0)
         short = short + 1 if step.alpha <= _SHORT and left >= best.left else 0
         if (left, -worst) <= (best.left, -best.worst):
             best = Untangled(x, int(left), worst)
         if settled:
             drags = left <= _FEW and patience.since >= _DRAGS
-            easy = drags or ((hasty or from_afar) and epsilon > _NARROW)
-            swift = easy and step.alpha >= 1.0 and not face
+            swift = (soft or drags) and step.alpha >= 1.0 and not face
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
 
@@ -177,7 +178,7 @@ def untangle_whole(
     glide: bool,
     thorough: bool = False,
     hasty: bool = False,
-    from_afar: bool = False,
+    soft: bool = False,
 ) -> Untangled:
     """Untangle all tets at once, until none or so few are inverted that patches serve better.
 
@@ -192,10 +193,10 @@ def untangle_whole(
     thorough : bool
         Leave none to the patches.
     hasty : bool
-        Leave them all to the patches where steps stay short or cure single ones, and take larger
-        ones on the way there.
-    from_afar : bool
-        Whether epsilon may be wide to begin with, so that many more turn over and back.
+        Leave them all to the patches where steps stay short or cure single ones.
+    soft : bool
+        Keep what is inverted far from holding up all else: long steps that leave few inverted, but
+        those farther than they were. With a boundary that does not glide.
     """
     o = model.options
     newton = model.newton(x, glide=glide, weights=model.roomy_weights)
@@ -225,7 +226,8 @@ def untangle_whole(
         steps=o.untangle_iter,
         enough=lambda left, since, epsilon: since >= patience(left, epsilon),
         hasty=hasty,
-        widest=_WIDEST_FROM_AFAR if from_afar else _WIDEST,
+        soft=_SOFT if soft else 0.0,
+        widest=_WIDEST_SOFT if soft else _WIDEST,
         linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
         budget=history.budget,
         note=note,
@@ -284,12 +286,16 @@ class Patch:
 def patches_round(
     model: SolidModel, tets: NDArray[np.intp], rings: int, *, glide: bool
 ) -> list[Patch]:
-    """Patches that reach ``rings`` further than some tets; those that overlap are united."""
+    """Patches that reach ``rings`` further than some tets; those that overlap are united.
+
+    They do not reach past vertices that do not move: nothing is handed on there, and where most
+    vertices lie on the boundary, single ones have hundreds of tets.
+    """
     T, motion = model.T, model.motion(glide=glide)
     near = np.zeros(len(model.V), bool)
     near[T[tets]] = True
     for _ in range(rings):
-        near[T[near[T].any(axis=1)]] = True
+        near[T[(near & (motion != FIXED))[T].any(axis=1)]] = True
     free = near & (motion != FIXED)
     rows = np.flatnonzero(free[T].any(axis=1))
     corners = T[rows]

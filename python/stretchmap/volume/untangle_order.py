@@ -29,8 +29,9 @@ __all__ = ["freed", "release", "untangle"]
 _log = logging.getLogger("stretchmap")
 
 _ROUNDS, _HASTY_ROUNDS = 12, 3  # of halving edges; fewer where another start follows
-# Reach of the patches, to begin with and where that does not help; and with more vertices there.
-_RINGS, _NARROW = (2, 4, 8), (2, 4)
+# Reach of the patches, to begin with and where that does not help; with more vertices there; where
+# another start follows; for what is far too large; and for letting go what was held.
+_RINGS, _NARROW, _HASTY, _NEAR, _RELEASED = (1, 2, 4, 8), (2, 4), (1, 2), 2, 4
 _HELPED = 0.95  # of them are left at most where patches are worth another round
 _FEW_STUCK = 60  # worth more vertices round them before anything else
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
@@ -111,8 +112,8 @@ def _hopeless(run: Run) -> bool:
 def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     """All tets, then patches, and where that does not do, both more thoroughly; tets left.
 
-    Where far too many tets are inverted for patches, all are begun with once more: in haste from
-    afar, then with more vertices.
+    Where far too many tets are inverted for patches, all are begun with once more, with more
+    vertices.
 
     A boundary that is going to glide on a mesh gives way before that. On a torus all of it would
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
@@ -122,12 +123,9 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     if not run.resumed:  # else it has been at its end
         _bring_near(run)
         begin = run.x
-        run.x = untangle_whole(history.model, begin, history, glide=False, hasty=run.hasty).x
-    if run.hasty and run.afar and _hopeless(run):
-        near, inverted = run.x, _inverted(run)
-        run.x = untangle_whole(history.model, begin, history, glide=False, from_afar=True).x
-        if _inverted(run) >= inverted:
-            run.x = near
+        run.x = untangle_whole(
+            history.model, begin, history, glide=False, hasty=run.hasty, soft=run.hasty
+        ).x
     if run.afar and _hopeless(run):
         _untangle_refined(run, begin)
     if run.hasty and _hopeless(run):
@@ -165,15 +163,14 @@ def _bring_near(run: Run) -> None:
     """What is far too large for where it is, brought down to that by itself, all else held.
 
     Where a boundary image squeezes a limb within a few edges, the body outside reaches farther into
-    it in the harmonic map than there is room.
+    it in the harmonic map than there is room. Among very many inverted tets, patches round these
+    are no better off than all of them.
     """
     model = run.history.model
     far = far_tets(model, run.x)
-    if not len(far):
+    if not len(far) or _hopeless(run):
         return
-    run.x = untangle_patches(
-        model, run.x, far, rings=_RINGS[0], glide=False, budget=run.history.budget
-    )
+    run.x = untangle_patches(model, run.x, far, rings=_NEAR, glide=False, budget=run.history.budget)
     _log.info("%d tets were far too large for where they are", len(far))
 
 
@@ -188,7 +185,7 @@ def _untangle_refined(run: Run, begin: NDArray[np.float64]) -> None:
     stuck = stuck_tets(history.model, run.x, glide=False)
     run.x = begin
     _halve(run, crowded_edges(before.solid, stuck), stuck)
-    run.x = untangle_whole(history.model, run.x, history, glide=False, hasty=True).x
+    run.x = untangle_whole(history.model, run.x, history, glide=False, hasty=True, soft=run.hasty).x
     if _hopeless(run):
         run.take(before)
 
@@ -237,11 +234,12 @@ def _patched(
 ) -> NDArray[np.intp]:
     """Untangle patches as long as that helps, and then larger ones if more than a few are left.
 
-    Those cost as much as another start, which serves more often: where one follows, it comes first.
+    The largest cost as much as another start, which serves more often: where one follows, it comes
+    first.
     """
     model, budget = run.history.model, run.history.budget
     stuck = stuck_tets(model, run.x, glide=glide)
-    wider = iter(rings or (_RINGS[:1] if run.hasty else _RINGS))
+    wider = iter(rings or (_HASTY if run.hasty else _RINGS))
     reach = next(wider)
     while 0 < len(stuck) <= MOST_STUCK * len(model.T) and not budget.spent:
         x = untangle_patches(model, run.x, stuck, rings=reach, glide=glide, budget=budget)
@@ -304,7 +302,7 @@ def release(run: Run) -> bool:
     stuck = stuck_tets(model, run.x, glide=True)
     if len(stuck):
         run.x = untangle_patches(
-            model, run.x, stuck, rings=_RINGS[1], glide=True, budget=history.budget
+            model, run.x, stuck, rings=_RELEASED, glide=True, budget=history.budget
         )
     if len(stuck_tets(model, run.x, glide=True)):
         run.take(before)

@@ -95,6 +95,9 @@ def test_one_way_of_asking_at_a_time():
         sm.volume_map(SOLID, balance=0.5, options=sm.VolumeOptions(volume_weight=2.0))
     with pytest.raises(OptionError, match="not both"):
         sm.volume_map(SOLID, balance=0.5, options=sm.VolumeOptions(free_ratios=(0.5, 2.0)))
+    with pytest.raises(OptionError, match="no target_iter, marginal_tol"):
+        levels = sm.VolumeOptions(target_iter=20, marginal_tol=1e-5)
+        sm.volume_map(SOLID, balance=0.5, options=levels)
 
 
 def test_the_picture_shows_every_map(maps):

@@ -93,6 +93,9 @@ def test_errors_name_what_is_wrong():
     for options in ({"c": 1.0}, {"max_iter": 3}, {"balance": 0.5}, {"boundary": "glide"}):
         with pytest.raises(OptionError, match="takes no"):
             sm.volume_map(SOLID, optimizer=newton, **options)
+    exact = sm.VolumeOptions(vertex_exact=True, ratio=2.0)
+    with pytest.raises(OptionError, match="does not take vertex_exact$"):
+        sm.volume_map(SOLID, optimizer=newton, options=exact)
 
 
 def test_a_refined_map_starts_one_of_the_input():

@@ -87,3 +87,40 @@ def test_a_step_knows_the_energy_where_it_begins():
         x, report = newton.step(x, w, options)
         assert report.before.energy == expected
         assert report.after.energy == newton.value(x, w).energy < expected
+
+
+def test_a_soft_energy_gives_each_inverted_tet_an_epsilon_of_its_own():
+    """sqrt(epsilon^2 + (soft min(det, 0))^2), of where the step begins and for all of it."""
+    from stretchmap import samples
+
+    solid = samples.solid_torus(600)
+    V, T, n = solid.V / solid.volume ** (1 / 3), solid.T, len(solid.V)
+    weights = solid.tet_volumes / solid.volume
+    rest = _core.volume.rest_matrices(V, T, 6.0)
+    newton = _core.volume.SolidNewton(
+        V, tets=T, rest=rest, weights=weights, motion=np.zeros(n, np.uint8)
+    )
+    x = V + 0.2 * np.random.default_rng(3).normal(size=V.shape)
+
+    def energy(at, own):
+        J = np.swapaxes(at[T[:, 1:]] - at[T[:, :1]], 1, 2) @ rest.reshape(-1, 3, 3)
+        det, root = np.linalg.det(J), np.hypot(0.3, own)
+        chi = 0.5 * (det + np.sqrt(root**2 + det**2))
+        shape = (J**2).sum(axis=(1, 2)) / (3.0 * chi ** (2 / 3)) - 1.0
+        return float(weights @ (shape + 2.0 * ((det**2 + 1.0) / (2.0 * chi) - 1.0))), det
+
+    det = energy(x, 0.0)[1]
+    assert (det < -1.0).any() and (det > 0.0).any()
+    linear = _core.volume.NewtonOptions()
+    for soft in (0.2, 0.0, 1.0):
+        w = _core.volume.EnergyWeights(1.0, 2.0, 0.3, 0.0, soft)
+        y, report = newton.step(x, w, linear)
+        own = soft * np.minimum(det, 0.0)
+        assert report.before.energy == pytest.approx(energy(x, own)[0], rel=1e-10)
+        assert report.after.energy == pytest.approx(energy(y, own)[0], rel=1e-10)
+        assert report.after.energy < report.before.energy
+    # A step that follows begins with what is inverted by then.
+    y, _ = newton.step(x, w, linear)
+    _, report = newton.step(y, w, linear)
+    own = np.minimum(energy(y, 0.0)[1], 0.0)
+    assert report.before.energy == pytest.approx(energy(y, own)[0], rel=1e-10)

@@ -10,6 +10,7 @@ import pytest
 import stretchmap as sm
 from stretchmap.base.budget import Budget
 from stretchmap.volume import untangle
+from stretchmap.volume.model import FIXED, History, SolidModel
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import VolumeProblem
 from stretchmap.volume.start import started
@@ -22,6 +23,7 @@ class Dragging:
     def __init__(self, left: int, alpha: float = 1.0, worst: float = -0.01) -> None:
         self.left, self.alpha, self.worst = left, alpha, worst
         self.epsilons: list[float] = []
+        self.soft: set[float] = set()
 
     def value(self, _x, _weights):
         return SimpleNamespace(
@@ -30,6 +32,7 @@ class Dragging:
 
     def step(self, x, weights, _linear):
         self.epsilons.append(weights.epsilon)
+        self.soft.add(weights.soft)
         here = self.value(x, weights)
         return x, SimpleNamespace(before=here, after=here, alpha=self.alpha)
 
@@ -68,19 +71,14 @@ def followed(worst: float, *, alpha: float = 1.0, face: float = 0.0, **given) ->
 
 
 def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
-    far, near = followed(-400.0, widest=20.0), followed(-400.0, hasty=True)
-    assert far[0] == 20.0 and near[0] == 1.0 and len(near) == 40
+    far, near = followed(-400.0, soft=0.2, widest=5.0), followed(-400.0, hasty=True)
+    assert far[0] == 5.0 and near[0] == 1.0 and len(near) == 40
     assert followed(-400.0, widest=np.inf)[0] == 80.0
     # More than before are inverted meanwhile: nothing is given up until epsilon is narrow.
     assert (far > 0.1).sum() + 40 == len(far)
-    # Full steps are hurried down to that, but not where faces glide, nor short ones.
-    for epsilons in (far, near):
-        pace = epsilons[1:] / epsilons[:-1]
-        assert pace[:5] == pytest.approx(np.sqrt(0.7), abs=0.01)
-        assert pace[-5:] == pytest.approx(np.sqrt(0.9), abs=0.01)
-    slows = [{"widest": 20.0, "alpha": 0.5}, {"hasty": True, "alpha": 0.5}, {}]
-    slows += [{"widest": 20.0, "face": 1.0}, {"hasty": True, "face": 1.0}]
-    for given in slows:
+    # Full steps are hurried, but not where faces glide, nor short ones.
+    assert far[1:] / far[:-1] == pytest.approx(np.sqrt(0.7), abs=0.01)
+    for given in ({"soft": 0.2, "alpha": 0.5}, {"soft": 0.2, "face": 1.0}, {"hasty": True}, {}):
         slow = followed(-400.0, **given)
         assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
 
@@ -173,3 +171,42 @@ def test_what_single_tets_hold_up_is_left_to_the_patches(given, steps):
             enough=lambda *_: False, linear=None, budget=Budget(60.0),
         )  # fmt: skip
         assert len(newton.epsilons) == (steps if hasty else 20)
+
+
+def tangled(seed: int) -> tuple[SolidModel, np.ndarray]:
+    """Inner vertices all off their places, and some far away."""
+    solid = sm.samples.bumpy_torus(3000)
+    problem = VolumeProblem.of(solid, solid.V[solid.boundary_vertices])
+    problem = started(problem, solver="auto")
+    model, x = problem.model(VolumeOptions(untangle_iter=12)), problem.x.copy()
+    inner, rng = np.setdiff1d(np.arange(len(x)), model.boundary), np.random.default_rng(seed)
+    x[inner] += 0.05 * rng.normal(size=(len(inner), 3))
+    far = rng.choice(inner, 4, replace=False)
+    x[far] += rng.normal(size=(4, 3))
+    return model, x
+
+
+def test_what_is_inverted_far_does_not_hold_up_all_else():
+    left = {True: 0, False: 0}
+    for seed in range(4):
+        model, x = tangled(seed)
+        for soft in left:
+            history = History(model, Budget(60.0))
+            found = untangle.untangle_whole(model, x, history, glide=False, hasty=True, soft=soft)
+            left[soft] += found.left
+    assert left[True] < 0.5 * left[False]
+
+
+def test_patches_reach_past_no_vertex_that_does_not_move():
+    solid = sm.samples.bumpy_torus(3000)
+    model = VolumeProblem.of(solid, solid.V[solid.boundary_vertices]).model(VolumeOptions())
+    T, free = model.T, np.ones(len(model.V), bool)
+    free[model.boundary] = False
+    first = int(np.flatnonzero(free[T].sum(axis=1) == 1)[0])
+    near = set(T[first])
+    for rings in range(3):
+        (patch,) = untangle.patches_round(model, np.array([first]), rings, glide=False)
+        moving = {v for v in near if free[v]}
+        assert set(patch.vertices[patch.motion != FIXED]) == moving
+        assert set(patch.tets) == {t for t in range(len(T)) if moving & set(T[t])}
+        near |= {v for t in patch.tets for v in T[t]}

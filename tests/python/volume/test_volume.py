@@ -392,11 +392,21 @@ def test_renumbering_rotating_and_scaling_the_input_changes_nothing(bumpy, rings
         {"c": float("nan")},
         {"max_iter": -1},
         {"c": 1.0, "options": sm.VolumeOptions(vertex_exact=True)},
+        {"c": 1.0, "options": sm.VolumeOptions(free_ratios=(0.5, 2.0))},
+        {"c": 1.0, "options": sm.VolumeOptions(volume_weight=1.0)},
     ],
 )
 def test_bad_options_are_named(bumpy, options):
     with pytest.raises(OptionError):
         sm.volume_map(bumpy, **options)
+
+
+@pytest.mark.parametrize("changed", [{"ratio": 4.0}, {"ratio": "conformal"}, {"phase": 0.1}])
+def test_the_torus_is_that_of_the_start(bumpy, frozen, changed):
+    options = sm.VolumeOptions(**changed)
+    for more in ({}, {"c": 1.0}, {"optimizer": lambda solid, image, torus: image}):
+        with pytest.raises(OptionError, match=f"of start; leave {next(iter(changed))} out"):
+            sm.volume_map(bumpy, start=frozen, options=options, **more)
 
 
 def test_a_solid_that_crosses_itself_is_refused_before_the_work(bumpy):

@@ -21,6 +21,7 @@ struct EnergyWeights {
   double shape = 1.0;
   double volume = 1.0;
   double epsilon = 0.0;   // 0: barrier; the energy is infinite on inverted tets and folded faces
+  double soft = 0.0;      // share of how far a tet is inverted that its own epsilon is at least
   double face = 0.0;      // of the boundary triangles, where the boundary glides
   double negative = 0.0;  // share of its negative eigenvalues that a model's Hessian keeps, below 1
 };
@@ -30,12 +31,16 @@ struct Regularized {
 };
 
 // \return chi(det) and its first two derivatives.
-inline Regularized regularized(double det, double epsilon) {
-  if (epsilon <= 0.0) return {det, 1.0, 0.0};
-  const double root = std::sqrt(epsilon * epsilon + det * det);
+inline Regularized regularized_by_square(double det, double square) {
+  if (square <= 0.0) return {det, 1.0, 0.0};
+  const double root = std::sqrt(square + det * det);
   // For negative det the sum of the definition cancels; this is the same number.
-  const double chi = det >= 0.0 ? 0.5 * (det + root) : 0.5 * epsilon * epsilon / (root - det);
-  return {chi, chi / root, 0.5 * epsilon * epsilon / (root * root * root)};
+  const double chi = det >= 0.0 ? 0.5 * (det + root) : 0.5 * square / (root - det);
+  return {chi, chi / root, 0.5 * square / (root * root * root)};
+}
+
+inline Regularized regularized(double det, double epsilon) {
+  return regularized_by_square(det, epsilon > 0.0 ? epsilon * epsilon : 0.0);
 }
 
 inline constexpr int kLanes = 8;
@@ -48,6 +53,7 @@ struct ElementBatch {
   alignas(64) Lane edges[9];  // edges[3 a + i] is component i of x_{a+1} - x0
   alignas(64) Lane rest[9];   // row-major
   alignas(64) Lane weight;    // factor of energy, gradient and Hessian
+  alignas(64) Lane own = {};  // the square of epsilon is that much larger, if epsilon > 0
   // Output.
   alignas(64) Lane energy;       // +infinity where epsilon = 0 and det J <= 0
   alignas(64) Lane det;          // of J

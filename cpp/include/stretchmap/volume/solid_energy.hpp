@@ -70,6 +70,10 @@ class SolidEnergy {
   // \param target (k) > 0, in the order of the tets given.
   void set_targets(const VecRef& target);
 
+  // From now on an inverted tet has an epsilon of its own, at least `share` of its determinant at
+  // x: then what is inverted far does not outweigh all else. A share of 0: the same for all.
+  void soften(const PointsRef& x, double share);
+
   // \param x (n, 3), here and below.
   // \return energy +infinity where it is not defined.
   EnergyReport value(const PointsRef& x, const EnergyWeights& w) const;
@@ -137,6 +141,7 @@ class SolidEnergy {
   static constexpr std::uint8_t kFar = 0xFF;
   Tets tets_;       // sorted by lowest row
   IndexVec order_;  // which of the tets given each of them is
+  Vec own_;         // (k) in the sorted order, see ElementBatch; empty: zeros
   Vec target_;      // (k) in the sorted order; empty: ones
   Rows rest_;
   Vec weights_;
