@@ -28,7 +28,7 @@ from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
 from ..mesh.split_edges import SplitSolid
 from ..volume.engine import solve
-from ..volume.options import FillOptions
+from ..volume.options import FillOptions, check_prescribed
 from ..volume.problem import VolumeProblem
 from .affine import affine_landmark_map
 from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
@@ -137,6 +137,7 @@ def register(
     callback("progress", progress)
     if options is not None:
         instance("options", options, FillOptions, "stretchmap.FillOptions(...)")
+        check_prescribed(options, glide=boundary == "glide")
     for mesh in (source, target):
         mesh.require_solid_torus()
     marks = _landmarks(landmarks, source, target)

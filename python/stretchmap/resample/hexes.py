@@ -67,7 +67,8 @@ def hex_mesh(
         Instead: the side of a cube of their mean volume.
     sections, block, rings : int, optional
         Instead, or in place of some of the numbers chosen: hexahedra round the axis, at least 3;
-        along a side of the middle block; layers between block and boundary.
+        along a side of the middle block; layers between block and boundary. All three leave
+        nothing to the two above.
     layers : sequence of float, optional
         Thicknesses of layers of hexahedra at the boundary, from there inwards, measured along the
         normals at its points; the outermost ring is split, which adds as many rings.
@@ -154,6 +155,11 @@ def _numbers(
     rings: int | None,
 ) -> list[tuple[int, int, int]]:
     """Candidates for the three numbers; one if some of them are given."""
+    all_given = None not in (sections, block, rings)
+    if all_given and not (n_hexahedra is target_size is None):
+        raise OptionError(
+            "sections, block and rings leave nothing to choose: leave out n_hexahedra, target_size"
+        )
     if sum((n_hexahedra is not None, target_size is not None)) > 1:
         raise OptionError("give n_hexahedra or target_size, not both")
     if target_size is not None:

@@ -24,7 +24,7 @@ from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.refinement import Refinement
 from .engine import solve
-from .options import FillOptions
+from .options import FillOptions, check_prescribed
 from .problem import Outcome, VolumeProblem
 
 __all__ = ["FillMap", "fill", "filled"]
@@ -175,6 +175,7 @@ def fill(
         )
     options = FillOptions() if options is None else options
     instance("options", options, FillOptions, "FillOptions(...)")
+    check_prescribed(options, glide=False)
     if not keep_best:
         require_no_crossing(solid.surface, "the boundary of the solid", UNLESS_KEPT)
     result = filled(solid, points, options, progress, anyway=keep_best)

@@ -22,7 +22,7 @@ from ..mesh.given import as_solid, require_same_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .boundary_starts import boundary_starts
 from .certified import certified_map
-from .options import VolumeOptions, balanced, check_call
+from .options import VolumeOptions, balanced, check_call, check_own
 from .own import Optimizer, run_optimizer
 from .problem import VolumeProblem
 from .ranked_starts import Start
@@ -89,14 +89,15 @@ def volume_map(
     max_iter : int, optional
         Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
     start : MapResult, optional
-        Any map to a torus: of ``solid.surface``, to prescribe the boundary, or of ``solid``, or of
+        Any map to a torus, which is kept (no ``ratio``, ``phase``): of ``solid.surface``, to prescribe the boundary, or of ``solid``, or of
         its refinement, to go on from. One of a refined surface is made anew of the surface as it
         is, on the same torus. What an optimizer of your own returned is one, too.
     optimizer : callable, optional
         ``optimizer(solid, image, torus)`` returns a better image, see `Optimizer`: a method of your
-        own in place of ours, from the start of a frozen boundary, measured and certified alike.
+        own in place of ours, from the start of a frozen boundary, measured and certified alike. Of
+        the options it takes ``ratio``, ``phase``, ``refine`` and ``solver``.
     options : VolumeOptions, optional
-        All other options.
+        All other options. ``"vsem"`` takes ``ratio``, ``phase``, ``tol`` and ``solver``.
     keep_best : bool
         Return the best map found even if it is not certified.
     threads : int, optional
@@ -167,7 +168,7 @@ def volume_map(
     if method is None:
         method = "certified" if c is None else "vsem"
     options = VolumeOptions() if options is None else options
-    check_call(method, boundary, c, max_iter, options)
+    check_call(method, boundary, c, max_iter, options, started=start is not None)
     if balance is not None:
         options = balanced(method, balance, options)
     callback("optimizer", optimizer)
@@ -176,6 +177,7 @@ def volume_map(
             raise OptionError(
                 "an optimizer of your own takes no method, boundary, c, max_iter or balance"
             )
+        check_own(options)
     keep_best = flag("keep_best", keep_best)
     callback("progress", progress)
     if solid.n_tets > _LARGE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Set
 from dataclasses import dataclass
 
 from ..area.search import Ratio
@@ -10,7 +11,16 @@ from ..base.options import SOLVERS, flag, instance, one_of, real, shown, whole
 from ..base.torus import MOST_ANGLE
 from ..errors import OptionError
 
-__all__ = ["FillOptions", "VolumeOptions", "balanced", "check_call", "free_at", "weight_at"]
+__all__ = [
+    "FillOptions",
+    "VolumeOptions",
+    "balanced",
+    "check_call",
+    "check_own",
+    "check_prescribed",
+    "free_at",
+    "weight_at",
+]
 
 
 _MOST_WEIGHT = 1e4  # of the volume term; beyond it nothing changes
@@ -40,9 +50,10 @@ class FillOptions:
     ----------
     refine : bool
         Split interior edges and faces whose vertices all lie on the boundary, which nothing inside
-        can repair, and edges round tets that stay inverted; on a torus, where the mean of
-        abs(ratio - 1) is above 0.05, also edges of the tets that keep their volume worst. False: a
-        mesh of the first kind is refused, and no other gets vertices.
+        can repair, and edges round tets that stay inverted; where the boundary glides on a torus,
+        volumes have their full weight (the default) and the mean of abs(ratio - 1) is above 0.05,
+        also edges of the tets that keep their volume worst. False: a mesh of the first kind is
+        refused, and no other gets vertices.
     time_limit : float
         Processor time per tet of the solid given, in seconds, after which no further stage is begun
         and a map with inverted tets is given up; a small mesh gets some seconds all the same.
@@ -205,8 +216,10 @@ def check_call(
     c: float | None,
     max_iter: int | None,
     options: VolumeOptions,
+    *,
+    started: bool = False,
 ) -> None:
-    """Whether arguments of `volume_map` go together."""
+    """Whether arguments of `volume_map` go together; ``started`` if a map to go on from is one."""
     one_of("method", method, ("certified", "vsem"))
     if boundary is not None:
         one_of("boundary", boundary, ("glide", "frozen"))
@@ -215,14 +228,46 @@ def check_call(
         raise OptionError(
             "Algorithm 5.1 holds the boundary; use method='certified' to let it glide"
         )
-    if method == "vsem" and options.vertex_exact:
-        raise OptionError("vertex_exact belongs to the certified route; leave c and method out")
+    if method == "vsem":
+        _only(options, _OF_PAPER, "Algorithm 5.1 does not take {}; leave c and method out")
     if method == "certified" and c is not None:
         raise OptionError("c belongs to Algorithm 5.1; use method='vsem' or leave it out")
+    if started:
+        _only(options, _FIELDS - _OF_TORUS, "the torus is that of start; leave {} out")
     if c is not None:
         real("c", c, 0.0)
     if max_iter is not None:
         whole("max_iter", max_iter, 0)
+
+
+def check_own(options: VolumeOptions) -> None:
+    """Whether options are of use to an optimizer of the user's own."""
+    _only(options, _OF_OWN, "an optimizer of your own does not take {}")
+
+
+def check_prescribed(options: FillOptions, *, glide: bool) -> None:
+    """Whether options are of use where the boundary is prescribed, or glides from there."""
+    kept = _OF_FILL if glide else _OF_FILL | {"free_ratios"}
+    _only(options, kept, "only volume_map takes {}: the boundary lies on no torus here")
+
+
+def _only(options: FillOptions, names: Set[str], why: str) -> None:
+    """Refuse others that are not as they are by default."""
+    others = [
+        field.name
+        for field in dataclasses.fields(options)
+        if field.name not in names and getattr(options, field.name) != field.default
+    ]
+    if others:
+        raise OptionError(why.format(", ".join(others)))
+
+
+_FIELDS = {field.name for field in dataclasses.fields(VolumeOptions)}
+_OF_FILL = {field.name for field in dataclasses.fields(FillOptions)}
+_OF_TORUS = {"ratio", "phase"}
+_OF_LEVELS = {"target_iter", "shift_iter", "marginal_tol"}
+_OF_OWN = {*_OF_TORUS, "refine", "solver"}
+_OF_PAPER = {*_OF_OWN, "tol"}  # which never refines
 
 
 def balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOptions:
@@ -236,6 +281,7 @@ def balanced(method: str, balance: float, options: VolumeOptions) -> VolumeOptio
         raise OptionError("give balance or options.free_ratios, not both")
     if balance == 1.0:
         return options
+    _only(options, _FIELDS - _OF_LEVELS, "balance below 1 leaves levels as they are: no {}")
     return dataclasses.replace(
         options,
         volume_weight=weight_at(balance),

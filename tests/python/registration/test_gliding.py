@@ -229,3 +229,6 @@ def test_there_and_back_is_measured(pair, maps):
 def test_ways_of_the_boundary_are_named(pair):
     with pytest.raises(OptionError):
         sm.register(pair.source, pair.target, boundary="hold")
+    options = sm.VolumeOptions(ratio=1.5, vertex_exact=True, free_ratios=(0.1, 5.0))
+    with pytest.raises(OptionError, match="takes free_ratios, ratio, vertex_exact:"):
+        sm.register(pair.source, pair.target, options=options)

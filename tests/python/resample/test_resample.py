@@ -198,7 +198,13 @@ def test_grids_larger_than_memory_are_refused_at_once(standard, numbers):
 
 
 def test_bad_input_is_named(standard, registered):
-    for options in ({"sections": 2}, {"block": 0}, {"rings": 0}):
+    for options in (
+        {"sections": 2},
+        {"block": 0},
+        {"rings": 0},
+        {"sections": 12, "block": 2, "rings": 1, "n_hexahedra": 99_999},
+        {"sections": 12, "block": 2, "rings": 1, "target_size": 0.1},
+    ):
         with pytest.raises(OptionError):
             hex_mesh(standard, **options)
     with pytest.raises(OptionError):

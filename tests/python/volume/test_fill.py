@@ -15,6 +15,7 @@ from stretchmap.errors import (
     DegenerateError,
     GenusError,
     NonFiniteError,
+    OptionError,
     OrientationError,
     SelfIntersectionError,
 )
@@ -205,6 +206,17 @@ def test_a_solid_with_a_cavity_is_refused(ball):
     hollow = TetMesh(ball.V, np.delete(ball.T, inside[:1], axis=0))
     with pytest.raises(GenusError, match="2 components"):
         sm.fill(hollow, hollow.surface.V)
+
+
+def test_options_of_maps_onto_a_torus_are_refused(ball):
+    for name, value in (("ratio", 2.0), ("tol", 0.1), ("vertex_exact", True), ("target_iter", 9)):
+        with pytest.raises(OptionError, match=f"only volume_map takes {name}:"):
+            sm.fill(ball, ball.surface.V, options=sm.VolumeOptions(**{name: value}))
+    loose = sm.VolumeOptions(free_ratios=(0.5, 2.0), volume_weight=10.0)
+    tight = sm.FillOptions(volume_weight=10.0)
+    squeezed = ball.surface.V * [2.0, 1.0, 0.25]
+    maps = [sm.fill(ball, squeezed, options=options) for options in (loose, tight)]
+    assert maps[0].distortion.element_std > maps[1].distortion.element_std
 
 
 def test_tets_the_boundary_decides_about_are_named_or_split():

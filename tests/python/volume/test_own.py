@@ -94,7 +94,7 @@ def test_errors_name_what_is_wrong():
         with pytest.raises(OptionError, match="takes no"):
             sm.volume_map(SOLID, optimizer=newton, **options)
     exact = sm.VolumeOptions(vertex_exact=True, ratio=2.0)
-    with pytest.raises(OptionError, match="does not take vertex_exact$"):
+    with pytest.raises(OptionError, match=r"does not take vertex_exact$"):
         sm.volume_map(SOLID, optimizer=newton, options=exact)
 
 
