@@ -38,7 +38,7 @@ __all__ = ["prepare"]
 
 _log = logging.getLogger("stretchmap")
 
-_MUCH = 0.1  # of the volume, to be lost without a word
+_MUCH = 0.1  # of the volume, to be lost or cut without a word
 _WELD = 1e-7  # share of the longest side of the bounding box
 _WORKING_FACES = 50_000  # handles are looked for on no more than about that many
 _WORKING_ITERATIONS = 3
@@ -65,7 +65,9 @@ def prepare(
     Vertices are welded, sheets that touch parted, faces oriented, debris dropped, holes closed,
     self-intersections cut out and refilled or, where that does not help, the surface rebuilt from
     the voxels it winds round, surplus handles cut along their shortest loops, the
-    surface remeshed to even triangles and filled with tets.
+    surface remeshed to even triangles and filled with tets. A cut takes a neighborhood of its loop:
+    a bridge goes, or a tunnel is filled, as far as it is hardly wider than there; the step
+    ``"handles"`` says how much of the volume that is.
 
     Parameters
     ----------
@@ -159,6 +161,7 @@ def prepare(
         closed = run.coarsen(closed, max(_WORKING_FACES, 2 * faces))
     sound = run.uncross(closed)
     whole, cuts = run.cut(sound, genus, max_cut)
+    volume += whole.volume - sound.volume  # what was cut is not lost
     solid = run.fill(*run.remesh(whole, faces), of_volume=volume)
     if solid.surface.genus != genus:
         raise GenusError(f"the solid has genus {solid.surface.genus}, {genus} was wanted")
@@ -212,7 +215,17 @@ class _Run:
         self.announce("handles")
         whole, cuts = cut_handles(surface, genus, max_cut, self._progress)
         kinds = [cut.kind for cut in cuts]
-        self.done("handles", {f"{kind}s_cut": kinds.count(kind) for kind in ("handle", "tunnel")})
+        counts = {f"{kind}s_cut": float(kinds.count(kind)) for kind in ("handle", "tunnel")}
+        gone = 1.0 - whole.volume / surface.volume
+        change = "removed" if gone >= 0.0 else "added"
+        counts[f"percent_of_volume_{change}"] = round(100.0 * abs(gone), 2)
+        self.done("handles", counts)
+        if abs(gone) > _MUCH:
+            _log.warning(
+                "prepare: cutting handles has %s %.0f %% of the volume; look at what is missing, "
+                "and lower max_cut if that is part of the shape",
+                change, 100.0 * abs(gone),
+            )  # fmt: skip
         return whole, cuts
 
     def remesh(self, surface: TriMesh, faces: int) -> tuple[TriMesh, float, bool]:

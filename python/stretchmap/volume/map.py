@@ -89,9 +89,10 @@ def volume_map(
     max_iter : int, optional
         Most steps of ``"vsem"`` (default 20) or of each last stage of ``"certified"``.
     start : MapResult, optional
-        Any map to a torus, which is kept (no ``ratio``, ``phase``): of ``solid.surface``, to prescribe the boundary, or of ``solid``, or of
-        its refinement, to go on from. One of a refined surface is made anew of the surface as it
-        is, on the same torus. What an optimizer of your own returned is one, too.
+        Any map to a torus, which is kept (no ``ratio``, ``phase``): of ``solid.surface``, to
+        prescribe the boundary, or of ``solid``, or of its refinement, to go on from. One of a
+        refined surface is made anew of the surface as it is, on the same torus. What an optimizer
+        of your own returned is one, too.
     optimizer : callable, optional
         ``optimizer(solid, image, torus)`` returns a better image, see `Optimizer`: a method of your
         own in place of ours, from the start of a frozen boundary, measured and certified alike. Of

@@ -94,6 +94,19 @@ def test_a_bridge_and_a_tunnel_are_told_apart():
         assert [cut.kind for cut in done.cuts] == [kind]
 
 
+def test_what_is_cut_off_is_told_where_it_is_cut(caplog):
+    surface = samples.double_torus(4)
+    done = sm.prepare(surface, faces=600, max_cut=0.9)
+    counts = {step.name: step.counts for step in done.steps}
+    cut, lost = (
+        counts["handles"]["percent_of_volume_removed"],
+        counts["fill"]["percent_of_volume_lost"],
+    )
+    left = 100.0 * done.solid.volume / surface.volume
+    assert 10.0 < cut < 20.0 and lost < 10.0 and left == pytest.approx(100.0 - cut - lost, abs=2.0)
+    assert "cutting handles has removed" in caplog.text and "thinner" not in caplog.text
+
+
 def test_handles_longer_than_the_limit_are_part_of_the_shape():
     with pytest.raises(GenusError, match="max_cut"):
         cut_handles(samples.double_torus(6), 1, 0.05)
