@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.options import instance
+from ..base.options import instance, real
 from ..certificate.comparison import Comparison
 from ..errors import OptionError
 from ..maps.result import MapResult
@@ -85,7 +85,7 @@ def tradeoff(maps: Mapping[float, MapResult]) -> Figure:
     Raises
     ------
     OptionError
-        Fewer than two maps.
+        Fewer than two maps, or a key that is no number.
     MissingDependencyError
         matplotlib is not installed.
 
@@ -99,9 +99,10 @@ def tradeoff(maps: Mapping[float, MapResult]) -> Figure:
     """
     if not isinstance(maps, Mapping) or len(maps) < 2:
         raise OptionError("maps must be a mapping of two or more values of balance to their maps")
+    given = {real("a key of maps", balance): result for balance, result in maps.items()}
     found = {
-        float(balance): instance("maps", maps[balance], MapResult, "maps of this package")
-        for balance in sorted(maps)
+        balance: instance("maps", given[balance], MapResult, "maps of this package")
+        for balance in sorted(given)
     }
     figure = empty_figure(6.0, 4.0)
     axes = figure.subplots()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.files import atomic_path
-from ..base.options import as_path, one_of
+from ..base.options import as_path, instance, one_of
 from ..errors import FileFormatError, MissingDependencyError, OptionError
 from ..maps.given import as_map_of_solid
 from ..maps.result import MapResult
@@ -91,7 +91,7 @@ def loops(mesh: TriMesh | TetMesh, *, off_screen: bool = True) -> pyvista.Plotte
     Parameters
     ----------
     mesh : TriMesh or TetMesh
-        Of any genus; of a solid its boundary.
+        Of any genus, a sphere having no loops; of a solid its boundary.
     off_screen : bool
         Draw without a window.
 
@@ -129,7 +129,8 @@ def loops(mesh: TriMesh | TetMesh, *, off_screen: bool = True) -> pyvista.Plotte
         look = {"color": shade, "line_width": 9, "render_lines_as_tubes": True}
         for loop in found:
             plotter.add_mesh(_ring(pv, surface.V[loop]), label=f"{name} loop", **look)
-    plotter.add_legend(bcolor="white", size=(0.2, 0.08 * len(families)))
+    if surface.genus:
+        plotter.add_legend(bcolor="white", size=(0.2, 0.08 * len(families)))
     _look(plotter)
     return plotter
 
@@ -147,6 +148,8 @@ def save(plotter: pyvista.Plotter, path: str | os.PathLike[str]) -> None:
     ------
     FileFormatError
         Another suffix.
+    OptionError
+        It is no scene, or one that is closed.
     OSError
         The file cannot be written.
 
@@ -159,8 +162,12 @@ def save(plotter: pyvista.Plotter, path: str | os.PathLike[str]) -> None:
     path = as_path(path)
     if path.suffix.lower() != ".png":
         raise FileFormatError(f"{path}: scenes are saved as .png")
+    _require_scene(plotter)
     with atomic_path(path) as temporary:
-        plotter.screenshot(str(temporary))
+        try:
+            plotter.screenshot(str(temporary))
+        except RuntimeError as error:
+            raise OptionError(f"the scene cannot be saved, make it anew: {error}") from error
     plotter.close()
 
 
@@ -180,7 +187,7 @@ def widget(plotter: pyvista.Plotter) -> Any:
     Raises
     ------
     OptionError
-        This is no notebook: call ``plotter.show()``.
+        It is no scene, or this is no notebook: call ``plotter.show()``.
 
     Examples
     --------
@@ -188,10 +195,15 @@ def widget(plotter: pyvista.Plotter) -> Any:
     >>> from stretchmap.plot import scene
     >>> scene.widget(scene.loops(sm.samples.double_torus()))  # doctest: +SKIP
     """
+    _require_scene(plotter)
     if not plotter.notebook:
         raise OptionError("widgets are for notebooks; elsewhere call show() of the scene")
     found = all(importlib.util.find_spec(name) for name in ("trame", "trame_vtk", "ipywidgets"))
     return plotter.show(jupyter_backend="html" if found else "static", return_viewer=True)
+
+
+def _require_scene(plotter: Any) -> None:
+    instance("plotter", plotter, _pyvista().Plotter, "from scene.cut or scene.loops")
 
 
 def _ring(pv: Any, points: NDArray[np.float64]) -> Any:

@@ -59,8 +59,24 @@ def test_a_cut_is_drawn(tmp_path, can_draw):
 
 
 def test_loops_are_drawn(tmp_path, can_draw):
-    picture = drawn("scene.save(scene.loops(samples.double_torus(1)), 'x.png')", tmp_path)
+    """Of a sphere, which has none, the surface; a scene that is closed is no picture any more."""
+    picture = drawn(
+        "scene.save(scene.loops(samples.double_torus(1)), 'x.png')\n"
+        "closed = scene.loops(samples.sphere(1))\n"
+        "scene.save(closed, 'sphere.png')\n"
+        "try:\n    scene.save(closed, 'again.png')\n"
+        "except sm.errors.OptionError as error:\n    assert 'make it anew' in str(error)",
+        tmp_path,
+    )
     assert picture.startswith(b"\x89PNG") and len(picture) > 10_000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["sphere.png", "x.png"]
+
+
+def test_what_is_no_scene_is_refused():
+    pytest.importorskip("pyvista")
+    for call in (lambda: scene.save(None, "x.png"), lambda: scene.widget(None)):
+        with pytest.raises(OptionError, match="plotter must be a Plotter"):
+            call()
 
 
 def test_wrong_requests_are_refused(area, monkeypatch):

@@ -107,3 +107,6 @@ def test_the_picture_shows_every_map(maps):
     assert {text.get_text() for text in axes.texts} == {f"{b:g}" for b in STEPS}
     with pytest.raises(OptionError, match="two or more"):
         sm.plot.tradeoff({1.0: maps[1.0]})
+    for key in (None, "a"):
+        with pytest.raises(OptionError, match="a key of maps must be a finite number"):
+            sm.plot.tradeoff({key: maps[1.0], 1: maps[1.0]})
