@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import describe
-from ..errors import SelfIntersectionError
+from ..errors import DegenerateError, SelfIntersectionError
 from .surfaces import MOST_PAIRS, TriMesh
 
 __all__ = ["UNLESS_KEPT", "require_no_crossing"]
 
 # The remedy where a map of it could be made, but not be proven one to one.
 UNLESS_KEPT = "repair it there, or see with keep_best=True how far a map gets all the same"
+
+
+_SMALLEST = 1e-75  # of a surface whose last digits, 1e-16 of it, the exact tests still reach
 
 
 def require_no_crossing(surface: TriMesh, what: str, remedy: str) -> None:
@@ -26,11 +29,18 @@ def require_no_crossing(surface: TriMesh, what: str, remedy: str) -> None:
 
     Raises
     ------
+    DegenerateError
+        All points lie so close together that nothing can be told.
     SelfIntersectionError
         ``ids`` are pairs of faces one after the other, a thousand at most.
     """
     pairs = surface.crossing_faces
     if len(pairs):
+        across = float(np.ptp(surface.V, axis=0).max())
+        if across < _SMALLEST:
+            raise DegenerateError(
+                f"{what} is {across:.3g} across, too small for any test; scale the points"
+            )
         more = "at least " if len(pairs) == MOST_PAIRS else ""
         faces = describe("face", np.unique(pairs))
         raise SelfIntersectionError(

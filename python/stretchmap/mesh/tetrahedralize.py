@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import describe
 from ..base.options import memory, real
-from ..errors import MissingDependencyError, SolverError
+from ..errors import GenusError, MissingDependencyError, SolverError
 from .crossings import require_no_crossing
 from .flat_tets import opened
 from .given import as_surface
@@ -61,6 +61,8 @@ def tetrahedralize(
     MeshError
         If the surface has a border, is not manifold or not orientable, or has a face without area
         or twice, see `TriMesh.diagnose`.
+    GenusError
+        If a part of it lies inside another, as that round a cavity does; ``ids`` are its faces.
     SelfIntersectionError
         If the surface crosses itself; ``ids`` are pairs of faces.
     SolverError
@@ -117,6 +119,7 @@ def _require_same_surface(solid: TetMesh, surface: TriMesh) -> None:
         raise SolverError(f"filling the surface with tets added {added} vertices to it")
     missing = np.setdiff1d(np.arange(n), ids)
     if len(missing):
+        _require_no_part_inside(surface, missing)
         raise SolverError(
             f"filling the surface with tets left {describe('vertex', missing)} off the boundary",
             missing.tolist(),
@@ -128,6 +131,20 @@ def _require_same_surface(solid: TetMesh, surface: TriMesh) -> None:
     if len(lost) or n_found != len(surface.F):
         raise SolverError(
             f"filling the surface with tets replaced {describe('face', lost)} of it", lost.tolist()
+        )
+
+
+def _require_no_part_inside(surface: TriMesh, missing: NDArray[np.integer[Any]]) -> None:
+    """Say so where the vertices that are left off are those of whole components."""
+    component = surface.diagnose().component
+    kept = component[~np.isin(surface.F, missing).all(axis=1)]
+    inside = np.flatnonzero(~np.isin(component, kept))
+    if len(inside):
+        raise GenusError(
+            f"a part of the surface, {describe('face', inside)}, lies inside another; cavities are "
+            "filled, and no solid with one can be mapped: leave those faces out, compact() drops "
+            "their vertices",
+            inside.tolist(),
         )
 
 

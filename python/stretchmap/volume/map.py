@@ -117,7 +117,8 @@ def volume_map(
     SelfIntersectionError
         Certified route without ``keep_best``: the boundary of the solid crosses itself.
     DegenerateError
-        ``refine=False`` and some interior edge or face cannot be repaired; ``ids`` are the tets.
+        ``refine=False`` and some interior edge or face cannot be repaired; ``ids`` are the tets. Or
+        the solid is so small that its volumes are no numbers any more.
     CertificationError
         The certified route left flipped tets or failed the certificate, ``ids`` are the elements.
     KindError

@@ -11,6 +11,20 @@ from stretchmap.mesh.flat_tets import opened
 from stretchmap.samples.solids import cut_cells
 
 
+def test_a_cavity_is_named_with_what_to_do():
+    pytest.importorskip("tetgen")
+    outer, inner = sm.samples.sphere(1), sm.samples.sphere(1)
+    for F in (inner.F, inner.F[:, ::-1]):  # whichever way it is turned
+        surface = sm.TriMesh(
+            np.vstack([outer.V, 0.5 * inner.V]), np.vstack([outer.F, F + len(outer.V)])
+        )
+        with pytest.raises(sm.errors.GenusError, match=r"lies inside another.*leave") as caught:
+            sm.tetrahedralize(surface)
+        assert caught.value.ids == tuple(range(len(outer.F), len(surface.F)))
+    left, _ = sm.TriMesh(surface.V, np.delete(surface.F, caught.value.ids, axis=0)).compact()
+    assert sm.tetrahedralize(left).diagnose().ok
+
+
 def box_with_flat_tets(step: int) -> sm.TetMesh:
     """A box; under every so many edges that divide a square of its surface lies a flat tet."""
     V, T = cut_cells(np.ones((3, 3, 2), bool))
