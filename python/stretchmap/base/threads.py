@@ -21,7 +21,7 @@ def threads(count: int | None) -> Iterator[None]:
     """Let everything inside a ``with`` block use this many threads.
 
     The number belongs to the calling Python thread, others keep theirs; afterwards it is what it
-    was. Results do not depend on it, to the last bit.
+    was. Results do not depend on it, to the last bit, unless the time limit of a map runs out.
 
     A forked process (``multiprocessing`` forks by default on Linux up to Python 3.13) computes with
     one thread whatever is asked, since the threads of its parent are not there any more. Threads

@@ -208,7 +208,11 @@ def resample(
     ] = None,
     rings: Annotated[int | None, typer.Option(help="Layers between block and boundary.")] = None,
     optimize: Annotated[
-        bool, typer.Option(help="Optimize the hexahedra's shape and the boundary's fit.")
+        bool,
+        typer.Option(
+            help="Optimize the hexahedra's shape and the boundary's fit, or write the grid as it "
+            "was pulled back; exit code 1 if hexahedra are not valid."
+        ),
     ] = True,
     json: Json = None,
     quiet: Quiet = False,
@@ -239,7 +243,7 @@ def resample(
         typer.echo(mesh.summary())
         typer.echo(f"written to {output}")
     if mesh.n_invalid:
-        _log.error("%d hexahedra are not valid", mesh.n_invalid)
+        _log.error("%d hexahedra are not valid; grid kept in %s", mesh.n_invalid, output)
         return 1
     return 0
 

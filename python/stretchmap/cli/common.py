@@ -40,7 +40,10 @@ Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No table and no prog
 Orient = Annotated[bool, typer.Option("--orient", help="Turn elements oriented the wrong way.")]
 Threads = Annotated[
     int | None,
-    typer.Option(help="Threads to use; the result does not depend on it.", show_default=False),
+    typer.Option(
+        help="Threads to use; the result depends on it only where time runs short.",
+        show_default=False,
+    ),
 ]
 Compact = Annotated[bool, typer.Option("--compact", help="Drop points that no element uses.")]
 

@@ -216,6 +216,13 @@ def test_resample_and_morph_commands(folder):
     assert (folder / "m_002.vtu").exists()
 
 
+def test_a_grid_as_it_was_pulled_back_is_kept(folder, capsys):
+    pytest.importorskip("meshio")
+    pulled = folder / "pulled.vtu"
+    assert run("resample", folder / "map.npz", "-o", pulled, "--no-optimize", "--sections", 3) == 1
+    assert f"not valid; grid kept in {pulled}" in capsys.readouterr().err and pulled.exists()
+
+
 def test_frames_appear_together_or_not_at_all(bumpy_map, tmp_path, monkeypatch):
     pytest.importorskip("meshio")
     write = sm.io.write
