@@ -46,8 +46,8 @@ _SOFT = 0.2
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
-# whole steps follow with ease, in patches after some settled ones. Faces that glide are not
-# hurried: single ones stay folded then.
+# whole steps follow with ease, in patches as long as epsilon is not narrow and after some settled
+# ones. Faces that glide are not hurried: single ones stay folded then.
 _SLOW, _SWIFT, _DRAGS = 0.9, 0.7, 2
 _BETTER = 1.05
 # Inverted elements, of those there were, that are progress in haste: patches are quicker than a
@@ -132,7 +132,7 @@ def _continue(
     state = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, face))
     left, worst = state.flips + state.folds, min(state.min_det, state.min_facing)
     # A better worst tet is not worth turning others over for long, nor many steps.
-    clean = left == 0
+    clean, from_afar = left == 0, widest > _WIDEST
     steps = min(steps, _AWAY) if clean else steps
     epsilon = floor if clean else min(max(0.2 * abs(worst), 10.0 * floor), widest)
     patience = Patience(left, worst)
@@ -151,14 +151,15 @@ def _continue(
             note(iteration, x, step, epsilon)
         left, worst = after.flips + after.folds, min(after.min_det, after.min_facing)
         settled = before - after.energy <= _SETTLED * (before + 2.0)
-        patience = Patience() if soft and epsilon > _NARROW else patience
+        wide = from_afar and epsilon > _NARROW
+        patience = Patience() if wide and not (soft and best.left <= _FEW) else patience
         patience.note(left, worst, settled, _FEWER if hasty else 1.0)
         short = short + 1 if step.alpha <= _SHORT and left >= best.left else 0
         if (left, -worst) <= (best.left, -best.worst):
             best = Untangled(x, int(left), worst)
         if settled:
             drags = left <= _FEW and patience.since >= _DRAGS
-            swift = (soft or drags) and step.alpha >= 1.0 and not face
+            swift = (soft or wide or drags) and step.alpha >= 1.0 and not face
             epsilon = max(_next_epsilon(epsilon, worst, _SWIFT if swift else _SLOW), _LEAST)
     return best
 

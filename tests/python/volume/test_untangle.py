@@ -60,9 +60,11 @@ def test_all_else_goes_the_published_pace(given):
     assert paces(**given) == pytest.approx(0.9)
 
 
-def followed(worst: float, *, alpha: float = 1.0, face: float = 0.0, **given) -> np.ndarray:
+def followed(
+    worst: float, *, left: int = 500, alpha: float = 1.0, face: float = 0.0, **given
+) -> np.ndarray:
     """Epsilons until patience ends."""
-    newton = Dragging(500, alpha, worst=worst)
+    newton = Dragging(left, alpha, worst=worst)
     _continue(
         newton, np.zeros((1, 3)), face=face, floor=0.02, steps=900,
         enough=lambda _, since, *__: since >= 40, linear=None, budget=Budget(60.0), **given,
@@ -71,14 +73,24 @@ def followed(worst: float, *, alpha: float = 1.0, face: float = 0.0, **given) ->
 
 
 def test_what_is_inverted_to_many_times_its_volume_is_brought_back_first():
-    far, near = followed(-400.0, soft=0.2, widest=5.0), followed(-400.0, hasty=True)
-    assert far[0] == 5.0 and near[0] == 1.0 and len(near) == 40
+    far, near = followed(-400.0, widest=20.0), followed(-400.0, hasty=True)
+    soft = followed(-400.0, soft=0.2, widest=5.0)
+    assert far[0] == 20.0 and soft[0] == 5.0 and near[0] == 1.0 and len(near) == 40
     assert followed(-400.0, widest=np.inf)[0] == 80.0
-    # More than before are inverted meanwhile: nothing is given up until epsilon is narrow.
-    assert (far > 0.1).sum() + 40 == len(far)
-    # Full steps are hurried, but not where faces glide, nor short ones.
-    assert far[1:] / far[:-1] == pytest.approx(np.sqrt(0.7), abs=0.01)
-    for given in ({"soft": 0.2, "alpha": 0.5}, {"soft": 0.2, "face": 1.0}, {"hasty": True}, {}):
+    # More than before are inverted meanwhile: nothing is given up until epsilon is narrow, unless
+    # so few had been that they are better left to patches.
+    for epsilons in (far, soft, followed(-400.0, soft=0.2, widest=5.0, left=31)):
+        assert (epsilons > 0.1).sum() + 40 == len(epsilons) > 50
+    assert len(followed(-400.0, soft=0.2, widest=5.0, left=30)) == 40
+    # Full steps are hurried down to that, soft ones further, but not where faces glide.
+    for epsilons, last in ((far, 0.9), (soft, 0.7)):
+        pace = epsilons[1:] / epsilons[:-1]
+        assert pace[:5] == pytest.approx(np.sqrt(0.7), abs=0.01)
+        assert pace[-5:] == pytest.approx(np.sqrt(last), abs=0.01)
+    wide: dict[str, float] = {"widest": 20.0}
+    slows = [{**wide, "alpha": 0.5}, {**wide, "face": 1.0}, {"hasty": True}, {}]
+    slows += [{"soft": 0.2, "alpha": 0.5}, {"soft": 0.2, "face": 1.0}]
+    for given in slows:
         slow = followed(-400.0, **given)
         assert slow[1:] / slow[:-1] == pytest.approx(np.sqrt(0.9), abs=0.01)
 
