@@ -2,100 +2,78 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <unordered_map>
 
 namespace stretchmap::partitions {
 namespace {
 
-constexpr double kSnap = 1e-9;
-
 using Face = std::vector<Index>;
+using Corner = Eigen::RowVector3d;
 
-// Vertices of a tet with the negative ones first, then those on the level, then the positive ones,
-// reached by an even permutation; always possible, two of the four being alike.
-struct Sorted {
-  std::array<Index, 4> v;
-  int negative = 0, zero = 0, positive = 0;
+// Faces of a tet that look outwards.
+constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+
+Index floor_half(Index i) { return (i - (i & 1)) / 2; }
+
+struct Cut {
+  std::uint64_t edge;
+  Index level;
+  bool operator==(const Cut& other) const { return edge == other.edge && level == other.level; }
 };
 
-Sorted sort_tet(const TetsRef& tets, Index t, const std::vector<signed char>& sign) {
-  Sorted s;
-  for (int a = 0; a < 4; ++a) s.v[a] = tets(t, a);
-  const auto of = [&](int a) { return sign[static_cast<std::size_t>(s.v[a])]; };
-  bool odd = false;
-  for (int end = 3; end > 0; --end)
-    for (int a = 0; a < end; ++a)
-      if (of(a) > of(a + 1)) {
-        std::swap(s.v[a], s.v[a + 1]);
-        odd = !odd;
-      }
-  for (int a = 0; odd && a < 3; ++a)
-    if (of(a) == of(a + 1)) {
-      std::swap(s.v[a], s.v[a + 1]);
-      odd = false;
-    }
-  for (int a = 0; a < 4; ++a) ++(of(a) < 0 ? s.negative : of(a) > 0 ? s.positive : s.zero);
-  return s;
-}
+struct CutHash {
+  std::size_t operator()(const Cut& c) const {
+    const std::uint64_t odd = 0x9e3779b97f4a7c15ULL;
+    return static_cast<std::size_t>((c.edge + static_cast<std::uint64_t>(c.level) * odd) * odd >>
+                                    7);
+  }
+};
 
 class Splitter {
  public:
-  Splitter(const TetsRef& tets, const VecRef& values, const VecRef& gate)
-      : tets_(tets), values_(values), gate_(gate), next_(static_cast<Index>(values.size())) {
-    snap();
-  }
+  Splitter(const TetsRef& tets, Index n_vertices, const PlacesRef& places, Index period)
+      : tets_(tets), places_(places), period_(period), next_(n_vertices) {}
 
   TetSplit run() {
     for (Index t = 0; t < tets_.rows(); ++t) split(t);
     TetSplit out;
-    const Index k = static_cast<Index>(side_.size());
+    const Index k = static_cast<Index>(slab_.size());
+    const Index c = static_cast<Index>(level_.size());
     out.tets = Eigen::Map<const Tets>(tet_.data(), k, 4);
-    out.side = Eigen::Map<const IndexVec>(side_.data(), k);
+    out.slab = Eigen::Map<const IndexVec>(slab_.data(), k);
     out.parent = Eigen::Map<const IndexVec>(parent_.data(), k);
-    out.cut_edges = Eigen::Map<const Edges>(edge_.data(), static_cast<Index>(weight_.size()), 2);
-    out.cut_weight = Eigen::Map<const Vec>(weight_.data(), static_cast<Index>(weight_.size()));
+    out.cut_edges = Eigen::Map<const Edges>(edge_.data(), c, 2);
+    out.cut_level = Eigen::Map<const IndexVec>(level_.data(), c);
     return out;
   }
 
  private:
-  void snap() {
-    sign_.resize(static_cast<std::size_t>(values_.size()));
-    for (Index i = 0; i < values_.size(); ++i)
-      sign_[static_cast<std::size_t>(i)] =
-          static_cast<signed char>((values_[i] > 0.0) - (values_[i] < 0.0));
-    for (Index t = 0; t < tets_.rows(); ++t)
-      for (int a = 0; a < 4; ++a)
-        for (int b = 0; b < 4; ++b) {
-          const double p = values_[tets_(t, a)], q = values_[tets_(t, b)];
-          if ((p > 0.0) != (q > 0.0) && std::abs(p) < kSnap * std::abs(q))
-            sign_[static_cast<std::size_t>(tets_(t, a))] = 0;
-        }
-  }
+  Index reduced(Index i) const { return (i % period_ + period_) % period_; }
 
-  Index cut(Index a, Index b) {
+  Index cut(Index a, Index b, Index level) {
     if (a > b) std::swap(a, b);
+    level = reduced(level);
     const std::uint64_t key = (static_cast<std::uint64_t>(a) << 32) | static_cast<std::uint64_t>(b);
-    const auto [entry, is_new] = cuts_.try_emplace(key, next_);
+    const auto [entry, is_new] = cuts_.try_emplace(Cut{key, level}, next_);
     if (is_new) {
       ++next_;
       edge_.insert(edge_.end(), {a, b});
-      weight_.push_back(values_[a] / (values_[a] - values_[b]));
+      level_.push_back(level);
     }
     return entry->second;
   }
 
-  void add(const std::array<Index, 4>& v, Index side, Index parent) {
+  void add(const std::array<Index, 4>& v, Index slab, Index parent) {
     tet_.insert(tet_.end(), v.begin(), v.end());
-    side_.push_back(side);
+    slab_.push_back(reduced(slab));
     parent_.push_back(parent);
   }
 
   // A convex piece given by its outward faces: cones from its lowest vertex over the faces away
   // from it, each face cut into a fan from its own lowest vertex. Two pieces cut a common face
   // alike.
-  void add_piece(const std::vector<Face>& faces, Index side, Index parent) {
+  void add_piece(const std::vector<Face>& faces, Index slab, Index parent) {
     Index apex = faces[0][0];
     for (const Face& face : faces)
       apex = std::min(apex, *std::min_element(face.begin(), face.end()));
@@ -105,88 +83,95 @@ class Splitter {
       const std::size_t first =
           static_cast<std::size_t>(std::min_element(face.begin(), face.end()) - face.begin());
       for (std::size_t i = 1; i + 1 < n; ++i)
-        add({apex, face[first], face[(first + i) % n], face[(first + i + 1) % n]}, side, parent);
+        add({apex, face[first], face[(first + i) % n], face[(first + i + 1) % n]}, slab, parent);
     }
   }
 
-  bool gated_off(const Sorted& s) const {
-    if (gate_.size() == 0) return false;
-    double sum = 0.0;
-    for (const Index a : s.v)
-      for (const Index b : s.v)
-        if (values_[a] < 0.0 && values_[b] > 0.0) {
-          const double w = values_[a] / (values_[a] - values_[b]);
-          sum += (1.0 - w) * gate_[a] + w * gate_[b];
-        }
-    return !(sum > 0.0);
+  // Whether a level, given by its place, separates two corners.
+  bool between(Index t, int p, int q, Index place) const {
+    const Index a = places_(t, p), b = places_(t, q);
+    return a != kEverywhere && b != kEverywhere && std::min(a, b) < place && place < std::max(a, b);
+  }
+
+  // The part of a face of a tet between two levels.
+  Face clipped(Index t, const int (&corners)[3], Index low, Index high) {
+    Face face;
+    for (int i = 0; i < 3; ++i) {
+      const int p = corners[i], q = corners[(i + 1) % 3];
+      const Index place = places_(t, p);
+      if (place == kEverywhere || (low <= place && place <= high)) face.push_back(tets_(t, p));
+      Index crossed[2] = {low, high};
+      if (places_(t, q) < place) std::swap(crossed[0], crossed[1]);
+      for (const Index at : crossed)
+        if (between(t, p, q, at)) face.push_back(cut(tets_(t, p), tets_(t, q), floor_half(at)));
+    }
+    return face;
+  }
+
+  // The section of a tet with a level that separates some of its corners, looking up.
+  Face section(Index t, Index place) {
+    static const Corner at[4] = {Corner::Zero(), Corner::UnitX(), Corner::UnitY(), Corner::UnitZ()};
+    Face face;
+    std::array<Corner, 4> points;
+    const auto push = [&](Index id, const Corner& point) {
+      points[face.size()] = point;
+      face.push_back(id);
+    };
+    int low = -1, high = -1;
+    for (int p = 0; p < 4; ++p) {
+      const Index here = places_(t, p);
+      if (here == kEverywhere || here == place) push(tets_(t, p), at[p]);
+      if (here != kEverywhere && here < place) low = p;
+      if (here != kEverywhere && here > place) high = p;
+    }
+    constexpr int kEdges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+    for (const auto& [p, q] : kEdges)
+      if (between(t, p, q, place))
+        push(cut(tets_(t, p), tets_(t, q), floor_half(place)), (at[p] + at[q]) / 2);
+    if (face.size() == 4) {
+      // Edges in their order: the first and the last of four that are cut have no corner in common.
+      std::swap(points[2], points[3]);
+      std::swap(face[2], face[3]);
+    }
+    const Corner normal = (points[1] - points[0]).cross(points[2] - points[0]);
+    if (normal.dot(at[high] - at[low]) < 0) std::reverse(face.begin(), face.end());
+    return face;
   }
 
   void split(Index t) {
-    const Sorted s = sort_tet(tets_, t, sign_);
-    if (s.negative == 0 || s.positive == 0 || gated_off(s)) {
-      Index side = s.positive > 0 ? 1 : -1;
-      if (s.negative > 0 && s.positive > 0) {
-        double largest = 0.0;
-        for (const Index a : s.v)
-          if (std::abs(values_[a]) > std::abs(largest)) largest = values_[a];
-        side = largest > 0.0 ? 1 : -1;
+    Index low = std::numeric_limits<Index>::max(), high = kEverywhere;
+    for (int p = 0; p < 4; ++p)
+      if (places_(t, p) != kEverywhere) {
+        low = std::min(low, places_(t, p));
+        high = std::max(high, places_(t, p));
       }
-      add({tets_(t, 0), tets_(t, 1), tets_(t, 2), tets_(t, 3)}, side, t);
-    } else if (s.zero == 2) {
-      const Index c = cut(s.v[0], s.v[3]);
-      add({s.v[0], s.v[1], s.v[2], c}, -1, t);
-      add({c, s.v[1], s.v[2], s.v[3]}, 1, t);
-    } else if (s.zero == 1) {
-      split_at_vertex(s, t);
-    } else if (s.negative == 2) {
-      split_two_two(s, t);
-    } else {
-      split_corner(s, t);
+    if (high == kEverywhere) low = high = 0;
+    const Index first = floor_half(low + 1), last = floor_half(high);
+    if (first >= last) {
+      add({tets_(t, 0), tets_(t, 1), tets_(t, 2), tets_(t, 3)}, last, t);
+      return;
+    }
+    Face below;
+    for (Index slab = first; slab <= last; ++slab) {
+      std::vector<Face> faces;
+      for (const auto& corners : kFaces) {
+        Face face = clipped(t, corners, 2 * slab - 1, 2 * slab + 1);
+        if (face.size() > 2) faces.push_back(std::move(face));
+      }
+      if (slab > first) faces.emplace_back(below.rbegin(), below.rend());
+      if (slab < last) {
+        below = section(t, 2 * slab + 1);
+        faces.push_back(below);
+      }
+      add_piece(faces, slab, t);
     }
   }
 
-  // One vertex on one side, one on the level, two on the other side.
-  void split_at_vertex(const Sorted& s, Index t) {
-    const bool low = s.negative == 1;
-    // (lone, level, x, y), an even permutation of (v0, v1, v2, v3).
-    const std::array<Index, 4> p = low ? std::array<Index, 4>{s.v[0], s.v[1], s.v[2], s.v[3]}
-                                       : std::array<Index, 4>{s.v[3], s.v[2], s.v[1], s.v[0]};
-    const Index side = low ? -1 : 1, x = cut(p[0], p[2]), y = cut(p[0], p[3]);
-    add({p[0], p[1], x, y}, side, t);
-    add_piece(
-        {{y, p[3], p[2], x}, {p[1], p[2], p[3]}, {y, p[1], p[3]}, {x, p[2], p[1]}, {p[1], y, x}},
-        -side, t);
-  }
-
-  // One vertex against three.
-  void split_corner(const Sorted& s, Index t) {
-    const bool low = s.negative == 1;
-    const std::array<Index, 4> p = low ? s.v : std::array<Index, 4>{s.v[3], s.v[2], s.v[1], s.v[0]};
-    const Index side = low ? -1 : 1;
-    const Index x = cut(p[0], p[1]), y = cut(p[0], p[2]), z = cut(p[0], p[3]);
-    add({p[0], x, y, z}, side, t);
-    add_piece(
-        {{p[1], p[2], p[3]}, {x, z, y}, {y, p[2], p[1], x}, {z, p[3], p[2], y}, {x, p[1], p[3], z}},
-        -side, t);
-  }
-
-  void split_two_two(const Sorted& s, Index t) {
-    const auto& v = s.v;
-    const Index a = cut(v[0], v[2]), b = cut(v[0], v[3]), c = cut(v[1], v[2]), d = cut(v[1], v[3]);
-    add_piece({{v[1], c, d}, {v[0], b, a}, {v[0], v[1], d, b}, {v[0], a, c, v[1]}, {c, a, b, d}},
-              -1, t);
-    add_piece({{c, v[2], v[3], d}, {b, v[3], v[2], a}, {d, v[3], b}, {a, v[2], c}, {d, b, a, c}}, 1,
-              t);
-  }
-
   const TetsRef& tets_;
-  const VecRef& values_;
-  const VecRef& gate_;
-  Index next_;
-  std::vector<signed char> sign_;
-  std::unordered_map<std::uint64_t, Index> cuts_;
-  std::vector<Index> tet_, side_, parent_, edge_;
-  std::vector<double> weight_;
+  const PlacesRef& places_;
+  Index period_, next_;
+  std::unordered_map<Cut, Index, CutHash> cuts_;
+  std::vector<Index> tet_, slab_, parent_, edge_, level_;
 };
 
 // Share of a tet in which the function is negative, from its four values in ascending order.
@@ -203,8 +188,15 @@ double share_below(std::array<double, 4> g) {
 
 }  // namespace
 
-TetSplit split_tets(const TetsRef& tets, const VecRef& values, const VecRef& gate) {
-  return Splitter(tets, values, gate).run();
+TetSplit split_tets(const TetsRef& tets, Index n_vertices, const PlacesRef& places, Index period) {
+  return Splitter(tets, n_vertices, places, period).run();
+}
+
+Vec shares_below(const CornersRef& values) {
+  Vec shares(values.rows());
+  for (Index t = 0; t < values.rows(); ++t)
+    shares[t] = share_below({values(t, 0), values(t, 1), values(t, 2), values(t, 3)});
+  return shares;
 }
 
 double volume_below(const TetsRef& tets, const VecRef& volumes, const VecRef& values) {

@@ -15,7 +15,9 @@ from ..base.arrays import as_reals
 from ..base.options import one_of, whole
 from ..base.torus import TWO_PI
 from ..errors import MeshError, OptionError, SolverError
-from .cutting import Pieces, middle_first
+from .cutting import cut_exactly
+from .heights import Heights, Ladder
+from .pieces import Pieces
 
 Coordinate = Literal["s", "u", "v"]
 
@@ -69,41 +71,46 @@ def asked_shares(
     return axes, shares
 
 
+def levels_of(
+    pieces: Pieces, axis: str, shares: NDArray[np.float64], start: float, of: str
+) -> NDArray[np.float64]:
+    """Levels that divide source or image as asked: p - 1 for s, p angles from 0 on for u and v."""
+    if axis == "s":
+        below = _shell_volume(pieces, of)
+        values = pieces.points[np.unique(pieces.T), 7]
+        ends = (float(values.min()), float(values.max()))
+    else:
+        below = _sector_volume(pieces, axis, start, of)
+        ends = (0.0, TWO_PI)
+    total = float(pieces.volumes(of).sum())
+    found = [_root(below, share * total, ends) for share in np.cumsum(shares)[:-1]]
+    return np.array(found if axis == "s" else [0.0, *found])
+
+
 def _shell_volume(pieces: Pieces, of: str) -> Callable[[float], float]:
     """Volume within the shell of a value of ``(s / r)^2``."""
     volumes, values = pieces.volumes(of), pieces.points[:, 7]
     return lambda level: _core.partitions.volume_below(pieces.T, volumes, values - level)
 
 
-def levels_of(
-    pieces: Pieces, axis: str, shares: NDArray[np.float64], start: float, of: str
-) -> NDArray[np.float64]:
-    """Levels that divide source or image as asked: p - 1 for s, p angles for u and v."""
-    if axis == "s":
-        below = _shell_volume(pieces, of)
-        values = pieces.points[:, 7]
-        ends = (float(values.min()), float(values.max()))
-    else:
-        below = _sector_volume(pieces, axis, start, of)
-        ends = (start, start + TWO_PI)
-    total = float(pieces.volumes(of).sum())
-    found = [_root(below, share * total, ends) for share in np.cumsum(shares)[:-1]]
-    return np.array(found if axis == "s" else [start, *found])
-
-
 def _sector_volume(pieces: Pieces, axis: str, start: float, of: str) -> Callable[[float], float]:
-    """Volume from the angle ``start`` up to another."""
-    halves = pieces.cut(axis, start, gated=False)
-    volumes = halves.volumes(of)
-    ahead = halves.side > 0
-    parts = [(np.ascontiguousarray(halves.T[m]), volumes[m]) for m in (ahead, ~ahead)]
-    first = float(parts[0][1].sum())
+    """Volume from the angle ``start`` up to another, counted from there."""
+    ladder = Ladder(Heights.of(pieces.points, axis, start), np.zeros(1))
+    halves = cut_exactly(pieces, ladder, np.ones(len(pieces.T), bool), None)[0]
+    heights, volumes = Heights.of(halves.points, axis, start), halves.volumes(of)
+    # The first sheet is at 0 for tets behind it, at a whole turn for those before.
+    corners = heights.corners(halves.T)
+    corners -= TWO_PI * np.floor(np.nanmean(corners, axis=1, keepdims=True) / TWO_PI)
+    low, high = np.nanmin(corners, axis=1), np.nanmax(corners, axis=1)
 
     def below(angle: float) -> float:
-        values = np.ascontiguousarray(halves.level_function(axis, angle)[0])
-        if angle - start <= math.pi:
-            return _core.partitions.volume_below(*parts[0], values)
-        return first + _core.partitions.volume_below(*parts[1], values)
+        cut = (low < angle) & (angle < high)
+        T = np.ascontiguousarray(halves.T[cut])
+        values = np.ascontiguousarray(
+            heights.above(np.arange(len(heights.values), dtype=np.int32), angle)
+        )
+        part = _core.partitions.volume_below(T, volumes[cut], values)
+        return float(volumes[high <= angle].sum()) + part
 
     return below
 
@@ -117,10 +124,24 @@ def _root(below: Callable[[float], float], target: float, ends: tuple[float, flo
     return float(brentq(excess, *ends, xtol=1e-15, rtol=4 * np.finfo(float).eps))
 
 
+# Levels, and the volumes below them as `cut_exactly` takes them.
+Levels = tuple[NDArray[np.float64], NDArray[np.float64] | None]
+
+
 def cut_nested(
-    pieces: Pieces, axes: tuple[str, ...], shares: list[NDArray[np.float64]], start: float
+    pieces: Pieces,
+    axes: tuple[str, ...],
+    counts: list[int],
+    start: float,
+    rule: Callable[[int, tuple[int, ...], Pieces], Levels],
 ) -> tuple[Pieces, NDArray[np.int32], tuple[NDArray[np.float64], ...]]:
-    """Cut along each coordinate at levels of their own within each part of those before it.
+    """Cut along each coordinate within each part of those before it.
+
+    Parameters
+    ----------
+    rule : callable
+        ``rule(i, cell, inside)`` returns the levels of the i-th coordinate in a cell of those
+        before it, and the volumes below them.
 
     Returns
     -------
@@ -131,18 +152,16 @@ def cut_nested(
     """
     labels = np.zeros(len(pieces.T), np.intp)
     levels: list[NDArray[np.float64]] = []
-    for i, (axis, share) in enumerate(zip(axes, shares, strict=True)):
-        before = [len(entry) for entry in shares[:i]]
+    for i, (axis, count) in enumerate(zip(axes, counts, strict=True)):
+        before = counts[:i]
         cuts = []
-        for cell in range(math.prod(before)):
-            cuts.append(levels_of(pieces.only(labels == cell), axis, share, start, "source"))
-            for level in middle_first(cuts[-1]):
-                pieces, origin = pieces.cut_within(labels == cell, axis, level)
-                labels = labels[origin]
-        parts = np.zeros(len(labels), np.intp)
-        for cell, levels_here in enumerate(cuts):
-            inside = labels == cell
-            parts[inside] = pieces.only(inside).parts_along(axis, levels_here)
-        labels = labels * len(share) + parts
+        labels = labels * count
+        for place, cell in enumerate(np.ndindex(*before)):
+            chosen = labels == place * count
+            here, targets = rule(i, cell, pieces.only(chosen))
+            ladder = Ladder(Heights.of(pieces.points, axis, start), here)
+            pieces, origin, parts = cut_exactly(pieces, ladder, chosen, targets)
+            labels = labels[origin] + np.maximum(parts, 0)
+            cuts.append(here + (0.0 if axis == "s" else start))
         levels.append(np.array(cuts).reshape(*before, -1))
     return pieces, labels.astype(np.int32), tuple(levels)

@@ -1,7 +1,7 @@
 """Partition of a solid into parts of prescribed volume, section 7.2.
 
 Level surfaces of the solid-torus coordinates are pulled back to the source by cutting every tet
-they cross. On a tet the level function is linear:
+along all levels that cross it at once, into slabs. On a tet the level function is linear:
 
 - ``u``: the half-plane at angle u through the axis, exact in the image;
 - ``v``: with A the piecewise-linear interpolant of ``hypot(x, y) - R``, the half-sheet where (A, z)
@@ -14,10 +14,16 @@ or have too much is the volume distortion of the map, reported as the uncorrecte
 correspond to Table 7.1. One-dimensional root finding then moves each level until the source is
 divided as asked: those of the first coordinate divide the whole, those of the second each part of
 the first by itself, and so on, so that every cell of a grid has the volume asked for.
+
+A surface that passes a vertex within a small share of an edge goes through the vertex instead, so
+that no tet is thin for its sake. Points where it cuts other edges move along them, about as little,
+until what lies below has its volume again. Where it goes through all vertices near it there are no
+such points, and a few vertices are passed by at a tenth of an edge.
 """
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,13 +37,14 @@ from ..base.arrays import read_only
 from ..base.options import flag, real, whole
 from ..base.tables import HasSummary, plain_dict, table
 from ..base.torus import MOST_ANGLE
-from ..errors import OptionError, SolverError
+from ..errors import CertificationError, OptionError, SolverError
 from ..maps.given import as_map_of_solid, torus_of
 from ..maps.result import MapResult
 from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
-from .cutting import Pieces, cut_all, part_volumes
-from .levels import Coordinate, asked_shares, cut_nested, levels_of
+from .core import with_core
+from .levels import Coordinate, Levels, asked_shares, cut_nested, levels_of
+from .pieces import Pieces
 
 __all__ = ["Coordinate", "Partition", "partition"]
 
@@ -117,7 +124,11 @@ class Partition(HasSummary, Exchanged):
         return TetMesh(self.solid.V, self.solid.T[self._tets(i)]).compact()[0]
 
     def surface(self, i: int) -> TriMesh:
-        """Closed boundary of part i, faces outward; raises as `part`."""
+        """Closed boundary of part i, faces outward; raises as `part`.
+
+        That of a shell has two components. The inner one looks into the hole, out of the shell, so
+        `TriMesh.diagnose` calls it inside out, as it would be by itself; nothing is to be turned.
+        """
         return self.part(i).surface
 
     def interface(self, i: int, j: int) -> TriMesh:
@@ -126,8 +137,10 @@ class Partition(HasSummary, Exchanged):
         Raises
         ------
         OptionError
-            If there is no such part, or they have no face in common.
+            If there is no such part, they are the same, or have no face in common.
         """
+        if i == j:
+            raise OptionError(f"an interface is between two parts, got {i} twice; see surface")
         first, second = (self._faces(p) for p in (i, j))
         keys = [
             np.sort(f, axis=1) @ (self.solid.n_vertices ** np.arange(3)) for f in (first, second)
@@ -221,15 +234,21 @@ def partition(
         If an option is out of range, the map has no torus, or the pieces do not fit into memory.
     KindError
         If it is no map, or that of a surface.
+    CertificationError
+        If tets of the image are folded or flat; ``ids`` are these.
     SolverError
         If the image has no volume to be divided, or a part misses its volume by more than 1e-12 of
-        it, as parts do that are so small that rounding decides; ``ids`` are those parts.
+        it or has tets without volume, as parts do that are so small that rounding decides; ``ids``
+        are those parts. Coordinates far from the origin are rounded, and volumes after them.
 
     Notes
     -----
-    Exact are the volumes of the parts, as sums of the tets they are cut into. The cuts lie where
-    the piecewise-linear level functions vanish (see the head of `stretchmap.partitions.parts`): for
-    u these are the half-planes of the image themselves, for v and s polyhedral sheets close to it.
+    Exact are the volumes of the parts, as sums of the tets they are cut into. The cuts lie close to
+    where the piecewise-linear level functions vanish (see the head of
+    `stretchmap.partitions.parts`): for u these are the half-planes of the image themselves, for v
+    and s polyhedral sheets. They go through vertices nearer than 3 % of an edge. Of tets there are
+    about five for each slab of a tet between two levels, so their number grows with that of parts;
+    where parts are thinner than tets these get thin, too.
     Section 7.2 of Yueh, Li, Lin, Yau (2020); the uncorrected errors are those of its Table 7.1.
 
     Examples
@@ -249,30 +268,41 @@ def partition(
     if start != 0.0 and axes == ("s",):
         raise OptionError("start is the angle where sectors of u or v begin; shells have none")
     pieces = Pieces.of(source, mapped.image, torus_of(mapped))
-    uncorrected = [
-        levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)
-    ]
-    cut, labels = cut_all(pieces, axes, uncorrected)
-    raw = part_volumes(cut, labels, shares)
-    levels = tuple(uncorrected)
-    if correct:
-        cut, labels, levels = cut_nested(pieces, axes, shares, start)
-    solid = TetMesh(cut.points[:, :3], cut.T)
+    _require_unfolded(pieces)
+    if "v" in axes:
+        pieces = with_core(pieces)
+    same = [levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)]
+    counts = [len(share) for share in shares]
+    cut, labels, _ = cut_nested(
+        pieces, axes, counts, start, lambda i, cell, inside: (same[i], None)
+    )
+    raw = np.bincount(labels, cut.volumes("source"), minlength=math.prod(counts))
+
+    def as_asked(i: int, cell: tuple[int, ...], inside: Pieces) -> Levels:
+        here = levels_of(inside, axes[i], shares[i], start, "source")
+        share = math.prod(shares[j][part] for j, part in enumerate(cell))
+        return here, share * total * np.cumsum(shares[i])[:-1]
+
+    def as_found(i: int, cell: tuple[int, ...], inside: Pieces) -> Levels:
+        parts = raw.reshape(counts)[cell].reshape(counts[i], -1).sum(axis=1)
+        return same[i], np.cumsum(parts)[:-1]
+
+    total = float(pieces.volumes("source").sum())
+    cut, labels, levels = cut_nested(pieces, axes, counts, start, as_asked if correct else as_found)
     asked = np.ones(1)
     for share in shares:
         asked = np.multiply.outer(asked, share).ravel()
+    if correct:
+        _require_volumes(cut, labels, asked * total)
+    solid = TetMesh(
+        np.concatenate([source.V, cut.points[source.n_vertices :, :3] + cut.center]), cut.T
+    )
+    _require_sound(solid, cut, labels)
     volumes = np.bincount(labels, solid.tet_volumes, minlength=len(asked))
-    total = source.volume
-    errors = volumes / (asked * total) - 1.0
-    off = np.flatnonzero(np.abs(errors) > _TOLERANCE)
-    if correct and len(off):
-        raise SolverError(
-            f"{len(off)} parts miss their volumes, part {off[0]} by {errors[off[0]]:.1e}: there is "
-            "not that much to divide but for rounding; ask for fewer or larger parts, or cut at "
-            "the uncorrected levels (correct=False)",
-            off,
-        )
+    if not correct:
+        raw = volumes
     running = np.cumsum(asked)[:-1]
+    errors = volumes / (asked * total) - 1.0
     return Partition(
         by=axes,
         fractions=read_only(asked),
@@ -281,7 +311,9 @@ def partition(
         labels=read_only(labels),
         parent_tet=read_only(cut.parent),
         levels=levels,
-        uncorrected_levels=tuple(uncorrected),
+        uncorrected_levels=tuple(
+            entry + (0.0 if axis == "s" else start) for axis, entry in zip(axes, same, strict=True)
+        ),
         volumes=read_only(volumes),
         errors=read_only(errors),
         uncorrected_errors=read_only(raw / (asked * total) - 1.0),
@@ -289,3 +321,43 @@ def partition(
             np.cumsum(raw)[:-1] / (running * total) - 1.0 if len(axes) == 1 else np.zeros(0)
         ),
     )
+
+
+def _require_unfolded(pieces: Pieces) -> None:
+    folded = _not_positive(pieces)
+    if len(folded):
+        raise CertificationError(
+            f"{len(folded)} tets of the image have no positive volume, so no level divides it; a "
+            "partition needs a certified map",
+            folded,
+        )
+
+
+def _not_positive(pieces: Pieces) -> NDArray[np.int32]:
+    image = np.ascontiguousarray(pieces.points[:, 3:6])
+    return np.asarray(_core.certificate.not_positive_tets(image, pieces.T), np.int32)
+
+
+def _require_volumes(cut: Pieces, labels: NDArray[np.int32], wanted: NDArray[np.float64]) -> None:
+    """Refuse parts that miss their volumes, apart from how far off the origin the solid lies."""
+    errors = np.bincount(labels, cut.volumes("source"), minlength=len(wanted)) / wanted - 1.0
+    off = np.flatnonzero(~(np.abs(errors) <= _TOLERANCE))
+    if len(off):
+        raise SolverError(
+            f"{len(off)} parts miss their volumes, part {off[0]} by {errors[off[0]]:.1e}: there is "
+            "not that much to divide but for rounding; ask for fewer or larger parts",
+            off,
+        )
+
+
+def _require_sound(solid: TetMesh, cut: Pieces, labels: NDArray[np.int32]) -> None:
+    """Refuse tets that rounding has left without volume."""
+    flat = solid.tet_volumes <= 0.0
+    flat[_not_positive(cut)] = True
+    if flat.any():
+        off = np.unique(labels[flat])
+        raise SolverError(
+            f"part {off[0]} is so thin that rounding turns {int(flat.sum())} of its tets inside "
+            "out; ask for fewer or larger parts",
+            off,
+        )

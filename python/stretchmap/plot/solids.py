@@ -189,11 +189,16 @@ class _Pieces:
         return self.points[:, 3:]
 
     def cut(self, values: Array) -> _Pieces:
-        split = _core.partitions.split_tets(self.T, np.ascontiguousarray(values), np.zeros(0))
-        first, second = (self.points[split.cut_edges[:, k]] for k in (0, 1))
-        added = first + split.cut_weight[:, None] * (second - first)
+        places = np.ascontiguousarray((np.sign(values) + 1).astype(np.int32)[self.T])
+        split = _core.partitions.split_tets(self.T, len(self.points), places, 2)
+        first, second = split.cut_edges.T
+        share = (values[first] / (values[first] - values[second]))[:, None]
+        added = (1.0 - share) * self.points[first] + share * self.points[second]
         return _Pieces(
-            np.concatenate([self.points, added]), split.tets, self.parent[split.parent], split.side
+            points=np.concatenate([self.points, added]),
+            T=split.tets,
+            parent=self.parent[split.parent],
+            side=2 * split.slab - 1,
         )
 
     def opened(self, front: float, openings: Array) -> tuple[_Pieces, NDArray[np.bool_]]:

@@ -9,8 +9,7 @@ import stretchmap as sm
 from shapes import a_map
 from stretchmap import _core, samples
 from stretchmap.base import options
-from stretchmap.errors import ArrayError, OptionError, SolverError
-from stretchmap.partitions.cutting import middle_first
+from stretchmap.errors import ArrayError, CertificationError, OptionError, SolverError
 from stretchmap.partitions.parts import partition
 
 RNG = np.random.default_rng(3)
@@ -37,7 +36,8 @@ def check(result, parts):
     children = np.bincount(parts.parent_tet, solid.tet_volumes)
     assert np.allclose(children, result.mesh.tet_volumes, rtol=1e-9, atol=1e-12 * total)
     assert solid.surface.volume == pytest.approx(total, rel=1e-12)
-    assert not [d.name for d in solid.diagnose().defects if d.name != "degenerate"]
+    assert not solid.diagnose().defects
+    assert not len(_core.certificate.not_positive_tets(parts.image, solid.T))
     for i in range(parts.n_parts):
         part = parts.part(i)
         closed = part.surface
@@ -61,7 +61,7 @@ def test_fifths_are_exact(bumpy_map, by):
 @pytest.mark.parametrize("by", ["s", "u", "v"])
 def test_unequal_shares_and_another_start(bumpy_map, by):
     shares = [0.55, 0.05, 0.3, 0.1]
-    parts = partition(bumpy_map, shares, by, start=1.0)
+    parts = partition(bumpy_map, shares, by, start=0.0 if by == "s" else 1.0)
     check(bumpy_map, parts)
     assert np.allclose(parts.volumes / bumpy_map.mesh.volume, shares, rtol=1e-12)
 
@@ -135,42 +135,113 @@ def test_a_part_too_small_for_its_volume_to_be_exact_is_refused(bumpy_map):
 def test_uncorrected_cells_are_those_of_the_image(bumpy_map):
     raw = partition(bumpy_map, (3, 2), ("u", "s"), correct=False)
     assert np.array_equal(raw.errors, raw.uncorrected_errors)
-    assert np.array_equal(
-        raw.uncorrected_errors, partition(bumpy_map, (3, 2), ("u", "s")).uncorrected_errors
-    )
+    corrected = partition(bumpy_map, (3, 2), ("u", "s"))
+    assert np.allclose(raw.uncorrected_errors, corrected.uncorrected_errors, rtol=0.0, atol=1e-13)
 
 
-def test_many_parts_take_no_more_pieces_than_they_must(bumpy_map, monkeypatch):
-    """Levels in their order leave a number of pieces that grows with its cube."""
-    few, many = (sm.partition(bumpy_map, n).solid.n_tets for n in (10, 20))
-    assert many < 4.6 * few
+@pytest.fixture(scope="module")
+def coarse_map():
+    """Of a symmetric solid, whose sheets pass closely by whole rows of vertices."""
+    return sm.volume_map(samples.solid_torus(1500))
+
+
+@pytest.fixture(scope="module")
+def rough_map():
+    return sm.volume_map(samples.bumpy_torus(1000))
+
+
+def flatness(solid):
+    """(k,) six times the volume by the cube of the longest edge."""
+    corners = solid.V[solid.T]
+    longest = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=-1).max(axis=(1, 2))
+    return 6.0 * solid.tet_volumes / longest**3
+
+
+@pytest.mark.parametrize(
+    ("fractions", "by", "least", "share"),
+    [
+        (4, "v", 1e-3, 0.0),
+        (40, "u", 3e-4, 0.0),
+        ((4, 4, 3), ("u", "v", "s"), 1e-10, 0.01),
+        ((3, 3), ("v", "u"), 1e-10, 0.05),
+        ([1e-6, 1.0 - 1e-6], "v", 1e-11, 1.0),
+        ([1e-6, 1.0 - 1e-6], "u", 1e-11, 1.0),
+    ],
+)
+def test_cuts_go_through_vertices_that_are_near(coarse_map, fractions, by, least, share):
+    """No tet without volume, and few that are thinner than the parts make them."""
+    parts = partition(coarse_map, fractions, by)
+    check(coarse_map, parts)
+    found = flatness(parts.solid)
+    assert found.min() > least and (found < 1e-4).mean() <= share
+
+
+def test_parts_can_be_filled_and_measured(coarse_map, rough_map):
+    part = partition(coarse_map, (4, 4, 3), by=("u", "v", "s")).part(0)
+    assert sm.fill(part, part.surface.V).certificate.certified
+    thin = partition(rough_map, [1e-6, 1.0 - 1e-6], "v")
+    assert sm.distortion(thin.solid, thin.image).flips == 0
+
+
+def test_a_solid_far_from_the_origin_is_cut_alike(coarse_map):
+    solid = coarse_map.mesh
+    far = sm.TetMesh(solid.V + np.array([5e5, 5e6, 100.0]), solid.T)
+    for by in ("s", "v"):
+        here = partition(coarse_map, 3, by)
+        there = partition(a_map(far, coarse_map.image, coarse_map.torus), 3, by)
+        assert there.solid.n_tets == here.solid.n_tets
+        assert np.allclose(there.levels[0], here.levels[0], atol=1e-7)
+        assert np.abs(there.errors).max() < 1e-9 and there.solid.tet_volumes.min() > 0.0
+
+
+def test_a_folded_map_is_refused(coarse_map):
+    image = coarse_map.image.copy()
+    image[5] += 2.0
+    with pytest.raises(CertificationError, match="no positive volume") as refused:
+        partition(a_map(coarse_map.mesh, image, coarse_map.torus), 2)
+    assert len(refused.value.ids)
+
+
+def test_an_interface_is_between_two_parts(coarse_map):
+    parts = partition(coarse_map, 3)
+    with pytest.raises(OptionError, match="twice"):
+        parts.interface(1, 1)
+    assert len(parts.surface(1).diagnose().inside_out) == parts.interface(1, 0).n_faces
+
+
+def test_pieces_grow_with_the_number_of_parts(rough_map, monkeypatch):
+    """Each tet is cut by all its levels at once, into slabs of a few pieces."""
+    for by in ("s", "v"):
+        few, many = (sm.partition(rough_map, n, by).solid.n_tets for n in (10, 40))
+        assert many < 4.3 * few
     monkeypatch.setattr(options, "installed_memory", lambda: 1e6)
     with pytest.raises(OptionError, match="so many parts of pieces"):
-        sm.partition(bumpy_map, 20)
-    assert list(middle_first(np.arange(1.0, 8.0))) == [4, 2, 1, 3, 6, 5, 7]
+        sm.partition(rough_map, 20)
 
 
 def test_cutting_one_tet_gives_the_share_of_the_formula():
+    """Along several levels, some of them through vertices, and along sheets through others."""
     T = np.array([[0, 1, 2, 3]], np.int32)
     V = np.vstack([np.zeros(3), np.eye(3)])
-    for trial in range(300):
-        values = RNG.standard_normal(4)
-        if trial % 3 == 0:
-            values[RNG.integers(4)] = 0.0
-        if trial % 6 == 0:
-            values[RNG.integers(4)] = 0.0
-        split = _core.partitions.split_tets(T, values, np.zeros(0))
+    for trial in range(600):
+        values = 5.0 * RNG.random(4)
+        on = RNG.random(4) < 0.2 * (trial % 3)
+        values[on] = np.round(values[on])
+        places = np.where(values == np.round(values), 2 * values + 1, 2 * np.floor(values) + 2)
+        places[RNG.permutation(4)[: trial // 200]] = _core.partitions.EVERYWHERE
+        split = _core.partitions.split_tets(T, 4, places[None].astype(np.int32), 100)
         a, b = split.cut_edges.T
-        w = split.cut_weight[:, None]
+        w = ((split.cut_level - values[a]) / (values[b] - values[a]))[:, None]
         points = np.concatenate([V, (1 - w) * V[a] + w * V[b]])
         volumes = _core.mesh.tet_volumes(points, split.tets)
         assert volumes.min() > 0.0 and volumes.sum() == pytest.approx(1 / 6, rel=1e-12)
-        below = volumes[split.side < 0].sum()
-        assert below == pytest.approx(
-            _core.partitions.volume_below(T, np.array([1 / 6]), values), abs=1e-13
-        )
-        samples_below = (RNG.dirichlet(np.ones(4), 2000) @ values < 0).mean() / 6
-        assert below == pytest.approx(samples_below, abs=0.01)
+        assert len(volumes) <= 6 * len(np.unique(split.slab))
+        for level in range(6 if trial < 200 else 0):
+            below = volumes[split.slab <= level].sum()
+            expected = _core.partitions.volume_below(T, np.array([1 / 6]), values - level)
+            assert below == pytest.approx(expected, abs=1e-13)
+            share = _core.partitions.shares_below((values - level)[None])
+            assert share[0] == pytest.approx(6.0 * expected, abs=1e-13)
 
 
 def test_saving(bumpy_map, tmp_path):
