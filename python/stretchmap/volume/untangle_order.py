@@ -33,7 +33,9 @@ _ROUNDS, _HASTY_ROUNDS = 12, 3  # of halving edges; fewer where another start fo
 # another start follows; for what is far too large; and for letting go what was held.
 _RINGS, _NARROW, _HASTY, _NEAR, _RELEASED = (1, 2, 4, 8), (2, 4), (1, 2), 2, 4
 _HELPED = 0.95  # of them are left at most where patches are worth another round
-_FEW_STUCK = 60  # worth more vertices round them before anything else
+# Worth more vertices round them before anything else; worth a boundary that glides round them
+# before another start.
+_FEW_STUCK, _FEW_GLIDING = 60, 300
 _GETTING_AWAY = 0.1  # share of the time left that a better start for all that follows is worth
 # Shares of the time left before the edges round stuck tets are halved instead, and for wide patches
 # where another start follows; that much of all has to be left for those.
@@ -135,7 +137,7 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     if run.hasty and history.budget.spent and _FEW_STUCK < len(stuck) <= _CURED * many:
         history.budget = run.budget.share(_GOING_ON)
         stuck = _patched(run, glide=False, few=_FEW_STUCK if cheap else 0)
-    if glide and 0 < len(stuck) <= _FEW_STUCK:
+    if glide and 0 < len(stuck) <= (_FEW_GLIDING if run.hasty else _FEW_STUCK):
         stuck = _patched_gliding(run, stuck)
     if cheap and 0 < len(stuck) <= _FEW_STUCK:
         more = run.budget.share(_NEARLY)
