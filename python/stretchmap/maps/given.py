@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from .. import _core
 from ..base.torus import Torus
-from ..errors import KindError, OptionError
+from ..errors import CertificationError, KindError, OptionError
 from ..mesh.meshes import TetMesh
 from .result import MapResult
 
-__all__ = ["as_map", "as_map_of_solid", "target_of", "torus_of"]
+__all__ = ["as_map", "as_map_of_solid", "require_unfolded", "target_of", "torus_of"]
 
 
 def as_map(result: Any, name: str = "result") -> MapResult:
@@ -53,6 +56,23 @@ def torus_of(result: MapResult) -> Torus:
     if result.torus is None:
         raise OptionError("the map has no torus, so there are no coordinates on it")
     return result.torus
+
+
+def require_unfolded(result: MapResult, solid: TetMesh, task: str) -> None:
+    """Refuse what is one to one nowhere near its folds; also in maps that are kept uncertified.
+
+    Raises
+    ------
+    CertificationError
+        Tets of the image have no positive volume; ``ids`` are these.
+    """
+    image = np.ascontiguousarray(result.image)
+    folded = np.asarray(_core.certificate.not_positive_tets(image, solid.T))
+    if len(folded):
+        raise CertificationError(
+            f"{len(folded)} tets of the image have no positive volume; {task} needs a certified map",
+            folded,
+        )
 
 
 def target_of(result: MapResult, task: str) -> TetMesh:

@@ -37,8 +37,8 @@ from ..base.arrays import read_only
 from ..base.options import flag, real, whole
 from ..base.tables import HasSummary, plain_dict, table
 from ..base.torus import MOST_ANGLE
-from ..errors import CertificationError, OptionError, SolverError
-from ..maps.given import as_map_of_solid, torus_of
+from ..errors import OptionError, SolverError
+from ..maps.given import as_map_of_solid, require_unfolded, torus_of
 from ..maps.result import MapResult
 from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
@@ -267,8 +267,9 @@ def partition(
     start, correct = real("start", start, -MOST_ANGLE, MOST_ANGLE), flag("correct", correct)
     if start != 0.0 and axes == ("s",):
         raise OptionError("start is the angle where sectors of u or v begin; shells have none")
-    pieces = Pieces.of(source, mapped.image, torus_of(mapped))
-    _require_unfolded(pieces)
+    torus = torus_of(mapped)
+    require_unfolded(mapped, source, "a partition")
+    pieces = Pieces.of(source, mapped.image, torus)
     if "v" in axes:
         pieces = with_core(pieces)
     same = [levels_of(pieces, a, p, start, "image") for a, p in zip(axes, shares, strict=True)]
@@ -323,21 +324,6 @@ def partition(
     )
 
 
-def _require_unfolded(pieces: Pieces) -> None:
-    folded = _not_positive(pieces)
-    if len(folded):
-        raise CertificationError(
-            f"{len(folded)} tets of the image have no positive volume, so no level divides it; a "
-            "partition needs a certified map",
-            folded,
-        )
-
-
-def _not_positive(pieces: Pieces) -> NDArray[np.int32]:
-    image = np.ascontiguousarray(pieces.points[:, 3:6])
-    return np.asarray(_core.certificate.not_positive_tets(image, pieces.T), np.int32)
-
-
 def _require_volumes(cut: Pieces, labels: NDArray[np.int32], wanted: NDArray[np.float64]) -> None:
     """Refuse parts that miss their volumes, apart from how far off the origin the solid lies."""
     errors = np.bincount(labels, cut.volumes("source"), minlength=len(wanted)) / wanted - 1.0
@@ -353,7 +339,8 @@ def _require_volumes(cut: Pieces, labels: NDArray[np.int32], wanted: NDArray[np.
 def _require_sound(solid: TetMesh, cut: Pieces, labels: NDArray[np.int32]) -> None:
     """Refuse tets that rounding has left without volume."""
     flat = solid.tet_volumes <= 0.0
-    flat[_not_positive(cut)] = True
+    image = np.ascontiguousarray(cut.points[:, 3:6])
+    flat[_core.certificate.not_positive_tets(image, cut.T)] = True
     if flat.any():
         off = np.unique(labels[flat])
         raise SolverError(

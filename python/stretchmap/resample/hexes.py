@@ -18,7 +18,7 @@ from ..base.options import callback, flag, memory, real, whole
 from ..base.progress import Progress
 from ..base.torus import Torus
 from ..errors import OptionError
-from ..maps.given import as_map_of_solid, torus_of
+from ..maps.given import as_map_of_solid, require_unfolded, torus_of
 from .boundary_layers import thicknesses_of, with_layers
 from .hex_result import HexMesh
 from .layout import Layout
@@ -89,6 +89,8 @@ def hex_mesh(
         each other, or the map has no torus.
     KindError
         If it is no map, or that of a surface.
+    CertificationError
+        If tets of the image are folded or flat; ``ids`` are these.
     SolverError
         If the core of the torus lies outside the image, the layers do not fit, or hexahedra are
         left that could not be made valid; then ``ids`` are those.
@@ -122,6 +124,7 @@ def hex_mesh(
     callback("progress", progress)
     thicknesses = thicknesses_of(layers)
     torus = torus_of(result)
+    require_unfolded(result, solid, "a grid of hexahedra")
     candidates = _numbers(
         solid.volume, torus.ratio, n_hexahedra, target_size, sections, block, rings
     )

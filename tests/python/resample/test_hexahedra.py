@@ -11,7 +11,7 @@ import pytest
 import stretchmap as sm
 from shapes import a_map
 from stretchmap import _core, samples
-from stretchmap.errors import FileFormatError
+from stretchmap.errors import CertificationError, FileFormatError
 from stretchmap.resample.hexes import hex_mesh
 from stretchmap.resample.layout import swept_layout
 from stretchmap.resample.quality import boundary_distances, boundary_quads
@@ -184,6 +184,15 @@ def test_nastran_files_hold_ten_digits_and_property_ids(grid, tmp_path):
     assert np.allclose(back.points, grid.V, rtol=1e-9, atol=1e-9)
     ids = [int(line[16:24]) for line in lines if line.startswith("CHEXA")]
     assert np.array_equal(ids, 100 * grid.layer + grid.block + 1)
+
+
+def test_a_folded_map_is_refused():
+    solid = samples.solid_torus(600)
+    image = solid.V.copy()
+    image[5] += 2.0
+    with pytest.raises(CertificationError, match="hexahedra needs a certified map") as refused:
+        hex_mesh(a_map(solid, image, sm.Torus(3.0, 1.0)), n_hexahedra=100)
+    assert len(refused.value.ids)
 
 
 def test_other_suffixes_are_refused(grid, tmp_path):
