@@ -59,7 +59,7 @@ def torus_of(result: MapResult) -> Torus:
 
 
 def require_unfolded(result: MapResult, solid: TetMesh, task: str) -> None:
-    """Refuse what is one to one nowhere near its folds; also in maps that are kept uncertified.
+    """Refuse a map that turns tets inside out, as one that is kept uncertified may.
 
     Raises
     ------
@@ -70,7 +70,8 @@ def require_unfolded(result: MapResult, solid: TetMesh, task: str) -> None:
     folded = np.asarray(_core.certificate.not_positive_tets(image, solid.T))
     if len(folded):
         raise CertificationError(
-            f"{len(folded)} tets of the image have no positive volume; {task} needs a certified map",
+            f"{len(folded)} tets of the image have no positive volume; {task} needs a certified "
+            "map",
             folded,
         )
 
