@@ -50,7 +50,7 @@ void bind_stretch(py::module_& m) {
 void bind_newton(py::module_& m) {
   py::class_<EnergyWeights>(m, "EnergyWeights")
       .def(py::init([](double shape, double volume, double epsilon, double face, double soft) {
-             return EnergyWeights{shape, volume, epsilon, soft, face};
+             return EnergyWeights{shape, volume, epsilon, face, 0.0, soft};
            }),
            py::arg("shape"), py::arg("volume"), py::arg("epsilon") = 0.0, py::arg("face") = 0.0,
            py::arg("soft") = 0.0)

@@ -29,7 +29,7 @@ struct Element {
 };
 
 // psi(J) with the derivatives that the kernel gives for the rest shape of the unit tet.
-Element evaluate(const Matrix3d& J, const EnergyWeights& weights) {
+Element evaluate(const Matrix3d& J, const EnergyWeights& weights, double own = 0.0) {
   ElementBatch batch;
   for (int lane = 0; lane < kLanes; ++lane) {
     for (int k = 0; k < 9; ++k) {
@@ -37,6 +37,7 @@ Element evaluate(const Matrix3d& J, const EnergyWeights& weights) {
       batch.rest[k][lane] = k % 4 == 0 ? 1.0 : 0.0;
     }
     batch.weight[lane] = 1.0;
+    batch.own[lane] = own;
   }
   volume::element_models(batch, weights);
   Element out;
@@ -126,6 +127,19 @@ TEST_CASE("the Hessian of a tet's energy is the differenced one, negative eigenv
       const Matrix9d error = evaluate(J, weights).hessian - damped(exact, weights.negative);
       CHECK(error.cwiseAbs().maxCoeff() < 1e-5 * exact.cwiseAbs().maxCoeff());
     }
+  }
+}
+
+TEST_CASE("an epsilon of a tet's own adds to the square of that of all, but is none without it") {
+  Jacobians random(10);
+  for (int trial = 0; trial < 10; ++trial) {
+    const Matrix3d J = random.next(Matrix3d::Identity(), 0.3, trial % 2 == 0);
+    const Element own = evaluate(J, {1.0, 2.0, 0.3}, 0.16), same = evaluate(J, {1.0, 2.0, 0.5});
+    CHECK(own.energy == doctest::Approx(same.energy).epsilon(1e-12));
+    CHECK(tests::relative_error(own.gradient, same.gradient) < 1e-12);
+    CHECK((own.hessian - same.hessian).cwiseAbs().maxCoeff() <
+          1e-12 * same.hessian.cwiseAbs().maxCoeff());
+    if (trial % 2 == 1) CHECK(evaluate(J, {}, 0.16).energy == evaluate(J, {}).energy);
   }
 }
 

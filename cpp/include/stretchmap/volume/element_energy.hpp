@@ -21,9 +21,9 @@ struct EnergyWeights {
   double shape = 1.0;
   double volume = 1.0;
   double epsilon = 0.0;   // 0: barrier; the energy is infinite on inverted tets and folded faces
-  double soft = 0.0;      // share of how far a tet is inverted that its own epsilon is at least
   double face = 0.0;      // of the boundary triangles, where the boundary glides
   double negative = 0.0;  // share of its negative eigenvalues that a model's Hessian keeps, below 1
+  double soft = 0.0;      // share of how far a tet is inverted that its own epsilon is at least
 };
 
 struct Regularized {
