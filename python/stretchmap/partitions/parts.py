@@ -44,7 +44,7 @@ from ..mesh.exchange import Cells, Exchanged
 from ..mesh.meshes import TetMesh, TriMesh
 from .core import with_core
 from .levels import Coordinate, Levels, asked_shares, cut_nested, levels_of
-from .pieces import Pieces
+from .pieces import Pieces, volumes_of_parts
 
 __all__ = ["Coordinate", "Partition", "partition"]
 
@@ -277,7 +277,7 @@ def partition(
     cut, labels, _ = cut_nested(
         pieces, axes, counts, start, lambda i, cell, inside: (same[i], None)
     )
-    raw = np.bincount(labels, cut.volumes("source"), minlength=math.prod(counts))
+    raw = volumes_of_parts(labels, cut.volumes("source"), math.prod(counts))
 
     def as_asked(i: int, cell: tuple[int, ...], inside: Pieces) -> Levels:
         here = levels_of(inside, axes[i], shares[i], start, "source")
@@ -299,7 +299,7 @@ def partition(
         np.concatenate([source.V, cut.points[source.n_vertices :, :3] + cut.center]), cut.T
     )
     _require_sound(solid, cut, labels)
-    volumes = np.bincount(labels, solid.tet_volumes, minlength=len(asked))
+    volumes = volumes_of_parts(labels, solid.tet_volumes, len(asked))
     if not correct:
         raw = volumes
     running = np.cumsum(asked)[:-1]
@@ -326,7 +326,7 @@ def partition(
 
 def _require_volumes(cut: Pieces, labels: NDArray[np.int32], wanted: NDArray[np.float64]) -> None:
     """Refuse parts that miss their volumes, apart from how far off the origin the solid lies."""
-    errors = np.bincount(labels, cut.volumes("source"), minlength=len(wanted)) / wanted - 1.0
+    errors = volumes_of_parts(labels, cut.volumes("source"), len(wanted)) / wanted - 1.0
     off = np.flatnonzero(~(np.abs(errors) <= _TOLERANCE))
     if len(off):
         raise SolverError(

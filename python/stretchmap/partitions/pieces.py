@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,3 +47,13 @@ class Pieces:
         """The chosen tets, with the same points."""
         T = np.ascontiguousarray(self.T[chosen])
         return Pieces(self.points, T, self.parent[chosen], self.center)
+
+
+def volumes_of_parts(
+    labels: NDArray[np.integer], volumes: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Volume of each part. Thin ones are what large ones leave, so these are summed in pairs."""
+    order = np.argsort(labels, kind="stable")
+    ends = np.searchsorted(labels[order], np.arange(count + 1))
+    sorted_ = volumes[order]
+    return np.array([sorted_[a:b].sum() for a, b in itertools.pairwise(ends)])

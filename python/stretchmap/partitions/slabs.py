@@ -12,7 +12,7 @@ from .. import _core
 from ..base.options import memory
 from ..base.torus import TWO_PI
 from .heights import Detours, Ids, Ladder, Reals
-from .pieces import Pieces
+from .pieces import Pieces, volumes_of_parts
 
 # How far cut points may move to make up for volume: an odds ratio, as a logarithm.
 _TILT = 0.7
@@ -147,8 +147,8 @@ class Slabs:
         """Chosen volume below each of the last levels, so many."""
         inside = self.labels >= 0
         volumes = self.pieces(tilts).only(inside).volumes("source")
-        parts = np.bincount(self.labels[inside], volumes, minlength=count + 1)
-        return np.cumsum(parts)[:count].astype(float)
+        parts = volumes_of_parts(self.labels[inside], volumes, count + 1)
+        return np.cumsum(parts)[:count]
 
     def _moved(self, level: int) -> Callable[[float], float]:
         """How much the chosen volume below a level grows by a tilt."""

@@ -202,6 +202,12 @@ def test_a_folded_map_is_refused(coarse_map):
     assert len(refused.value.ids)
 
 
+def test_thin_parts_lose_nothing_to_the_sums_of_others(rough_map):
+    shells = [0.28, 0.57, 0.1495, 0.0005]
+    parts = partition(rough_map, (shells, 3), ("s", "u"), start=-2.0)
+    assert np.abs(parts.errors).max() < 1e-12
+
+
 def test_an_interface_is_between_two_parts(coarse_map):
     parts = partition(coarse_map, 3)
     with pytest.raises(OptionError, match="twice"):
