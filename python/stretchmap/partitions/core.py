@@ -62,12 +62,22 @@ def _near_vertices(pieces: Pieces) -> NDArray[np.integer]:
 
 def _core_faces(pieces: Pieces) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Faces the core goes through, lowest vertex first, and where: barycentric coordinates."""
-    tet, corner = np.nonzero(Heights.of(pieces.points, "v", 0.0).turns(pieces.T))
-    faces = np.unique(np.sort(pieces.T[tet[:, None], TET_FACES[corner]], axis=1), axis=0)
+    T = pieces.T[_round_core(pieces)]
+    tet, corner = np.nonzero(Heights.of(pieces.points, "v", 0.0).turns(T))
+    faces = np.unique(np.sort(T[tet[:, None], TET_FACES[corner]], axis=1), axis=0)
     a, b = pieces.points[:, CORE].T[:, faces]  # (faces, 3)
     on, after = [1, 2, 0], [2, 0, 1]
     areas = np.abs(a[:, on] * b[:, after] - a[:, after] * b[:, on])
     return faces, areas / areas.sum(axis=1, keepdims=True)
+
+
+def _round_core(pieces: Pieces) -> NDArray[np.bool_]:
+    """Tets whose corners lie on both sides of the core, along each axis: all it can go through."""
+    found = np.ones(len(pieces.T), bool)
+    for column in CORE:
+        corners = list(pieces.points[:, column][pieces.T].T)
+        found &= (np.minimum.reduce(corners) <= 0.0) & (np.maximum.reduce(corners) >= 0.0)
+    return found
 
 
 def _split_edges(pieces: Pieces, faces: NDArray[np.int32], weights: NDArray[np.float64]) -> Pieces:

@@ -173,6 +173,10 @@ class Ladder:
         heights = self.heights
         edges = T[:, TET_EDGES].reshape(-1, 2)
         a, b = edges[inner[edges].all(axis=1)].T
+        apart = place[a] != place[b]
+        if heights.pair is not None:  # the short way round may lead through all levels
+            apart |= np.abs(heights.values[a] - heights.values[b]) > np.pi
+        a, b = a[apart], b[apart]
         rise = heights.rise(a, b)
         up = rise >= 0.0
         low, high, rise = np.where(up, a, b), np.where(up, b, a), np.abs(rise)

@@ -52,7 +52,10 @@ class Slabs:
     ) -> None:
         inner = np.zeros(len(pieces.points), bool)
         inner[pieces.T[chosen]] = True
-        touched = np.flatnonzero(inner[pieces.T].sum(axis=1) > 1)
+        count = np.zeros(len(pieces.T), np.int8)
+        for corner in pieces.T.T:  # several times as fast as sums along rows of four
+            count += inner[corner]
+        touched = np.flatnonzero(count > 1)
         untouched = np.setdiff1d(np.arange(len(pieces.T)), touched, assume_unique=True)
         T = np.ascontiguousarray(pieces.T[touched])
         self._before, self._ladder, self._detours = pieces, ladder, detours
@@ -60,8 +63,8 @@ class Slabs:
         self.own = pieces.only(touched[chosen[touched]])
         self.corners, self.volumes = places[chosen[touched]], self.own.volumes("source")
         known = self.corners != _core.partitions.EVERYWHERE
-        self._low = np.where(known, self.corners, 2**30).min(axis=1, initial=2**30)
-        self._high = self.corners.max(axis=1, initial=-(2**30))
+        self._low = np.minimum.reduce(list(np.where(known, self.corners, 2**30).T))
+        self._high = np.maximum.reduce(list(self.corners.T))
         slabs = np.maximum(self._high - self._low, 0).sum(dtype=float) / 2 + len(T)
         memory("so many parts of pieces this small", _BYTES_PER_PIECE * _PIECES * slabs)
         split = _core.partitions.split_tets(T, len(pieces.points), places, ladder.period)
