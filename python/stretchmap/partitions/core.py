@@ -109,12 +109,18 @@ def _split_edges(pieces: Pieces, faces: NDArray[np.int32], weights: NDArray[np.f
 def _split_faces(pieces: Pieces, faces: NDArray[np.int32], weights: NDArray[np.float64]) -> Pieces:
     """Faces cut in three where the core goes through, with the tets on both sides."""
     n = len(pieces.points)
-    to_key = np.array([n * n, n, 1])  # exact as real numbers would not be beyond 2^21 points
-    keys = faces.astype(object) @ to_key if n > 2_000_000 else faces.astype(np.int64) @ to_key
+    pairs = np.unique(faces[:, 0].astype(np.int64) * n + faces[:, 1])
+
+    def numbered(faces: NDArray[np.int32]) -> NDArray[np.int64]:
+        """A number for each face of those cut, lowest vertex first, and -1 for others."""
+        pair = faces[..., 0].astype(np.int64) * n + faces[..., 1]
+        place = np.minimum(np.searchsorted(pairs, pair), len(pairs) - 1)
+        return np.where(pairs[place] == pair, place * n + faces[..., 2], -1)
+
+    keys = numbered(faces)
     added = (weights[:, :, None] * pieces.points[faces]).sum(axis=1)
     while True:
-        own = np.sort(pieces.T[:, TET_FACES], axis=2)
-        own = own.astype(keys.dtype) @ to_key  # (k, 4)
+        own = numbered(np.sort(pieces.T[:, TET_FACES], axis=2))  # (k, 4)
         found = np.isin(own, keys)
         touched = np.flatnonzero(found.any(axis=1))
         if not len(touched):
