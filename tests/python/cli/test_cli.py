@@ -15,11 +15,11 @@ import pytest
 
 import shapes
 import stretchmap as sm
+from command_line import failing
 from stretchmap import TetMesh, TriMesh, samples
 from stretchmap.cli import GROUPS, main
 from stretchmap.cli.guard import guarded, in_words_of_the_command_line
 from stretchmap.errors import CertificationError
-from stretchmap.io import read_arrays
 
 pytest.importorskip("typer")
 
@@ -33,33 +33,6 @@ REPORT_KEYS = set(
     certified reason
     """.split()
 )
-
-
-@pytest.fixture(scope="module")
-def solid():
-    return samples.bumpy_torus(2500)
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch, solid):
-    """A folder with a good solid and its surface, made the current one."""
-    monkeypatch.chdir(tmp_path)
-    sm.write("solid.npz", solid)
-    sm.write("surface.ply", solid.surface)
-    return tmp_path
-
-
-def failing(capsys, *arguments):
-    """Run a command that must fail; returns the exit code and the one line of error."""
-    before = {p.name for p in os.scandir(".")}
-    code = main(arguments)
-    out, err = capsys.readouterr()
-    assert {p.name for p in os.scandir(".")} == before, "a file was left behind"
-    assert out == ""
-    assert "Traceback" not in err and "internal error" not in err
-    lines = [line for line in err.splitlines() if not line.startswith("stretchmap: warning: ")]
-    assert len(lines) == 1 and lines[0].startswith("stretchmap: error: "), err
-    return code, lines[0].removeprefix("stretchmap: error: ")
 
 
 @pytest.mark.parametrize("command", ["conformal", "area", "volume"])
@@ -137,49 +110,6 @@ def test_a_run_goes_on_from_a_saved_map(folder):
     first, second = sm.load_map("a.npz"), sm.load_map("b.npz")
     assert second.distortion.element_std <= first.distortion.element_std
     assert np.array_equal(first.mesh.T, second.mesh.T)
-
-
-def test_fields_of_a_saved_map_are_not_carried_along(folder, capsys):
-    pytest.importorskip("meshio")
-    assert main(["conformal", "surface.ply", "-o", "map.vtu", "-q"]) == 0
-    assert {"u", "v"} <= sm.io.read_arrays("map.vtu").point_data.keys()
-    assert main(["conformal", "map.vtu", "-o", "again.vtu", "-q"]) == 0
-    assert capsys.readouterr() == ("", "")
-
-
-def test_fields_named_like_those_of_maps_are_left_out_with_a_word(folder, capsys):
-    pytest.importorskip("meshio")
-    surface = sm.read("surface.ply")
-    sm.write("flow.vtu", surface, point_data={"u": surface.V[:, 0], "load": surface.V[:, 1]})
-    assert main(["conformal", "flow.vtu", "-o", "map.vtu"]) == 0
-    said = capsys.readouterr().err
-    assert "left out: u;" in said and "load" not in said
-    assert "load" in sm.io.read_arrays("map.vtu").point_data
-
-
-def test_fields_the_output_has_other_types_for_are_carried(folder, capsys):
-    pytest.importorskip("meshio")
-    surface = sm.read("surface.ply")
-    labels = np.arange(surface.n_faces, dtype=np.uint8)
-    sm.write("labels.vtu", surface, cell_data={"my labels": labels})
-    for suffix in (".xdmf", ".vtk"):
-        assert main(["conformal", "labels.vtu", "-o", f"map{suffix}", "-q"]) == 0
-        np.testing.assert_array_equal(read_arrays(f"map{suffix}").cell_data["my labels"], labels)
-    assert capsys.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("command", ["conformal", "area", "volume", "fill", "register"])
-def test_fields_the_output_cannot_hold_are_refused_before_the_work(command, folder, capsys):
-    pytest.importorskip("meshio")
-    solid = sm.read("solid.npz")
-    sm.write("four.npz", solid, point_data={"four": np.ones((solid.n_vertices, 4))})
-    np.savez("image.npz", ids=solid.boundary_vertices, image=solid.V[solid.boundary_vertices])
-    further = {"fill": ["--boundary", "image.npz"], "register": ["solid.npz"]}.get(command, [])
-    start = time.process_time()
-    code, error = failing(capsys, command, "four.npz", *further, "-o", "map.xdmf", "-q")
-    assert time.process_time() - start < 1.0
-    assert code == 2 and error.startswith("map.xdmf: 'four' has 4 columns")
-    assert ".vtu or .npz" in error
 
 
 def test_start_from_another_solids_map_is_refused(folder, capsys):

@@ -1,0 +1,66 @@
+"""Fields of a mesh that its map has, too: carried along, left out with a word, or refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stretchmap as sm
+from command_line import failing
+from stretchmap.cli import main
+from stretchmap.io import read_arrays
+
+pytest.importorskip("typer")
+
+
+def test_fields_of_a_saved_map_are_not_carried_along(folder, capsys):
+    pytest.importorskip("meshio")
+    assert main(["conformal", "surface.ply", "-o", "map.vtu", "-q"]) == 0
+    assert {"u", "v"} <= sm.io.read_arrays("map.vtu").point_data.keys()
+    assert main(["conformal", "map.vtu", "-o", "again.vtu", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_fields_named_like_those_of_maps_are_left_out_with_a_word(folder, capsys):
+    pytest.importorskip("meshio")
+    surface = sm.read("surface.ply")
+    sm.write("flow.vtu", surface, point_data={"u": surface.V[:, 0], "load": surface.V[:, 1]})
+    assert main(["conformal", "flow.vtu", "-o", "map.vtu"]) == 0
+    said = capsys.readouterr().err
+    assert "left out: u;" in said and "load" not in said
+    assert "load" in sm.io.read_arrays("map.vtu").point_data
+
+
+def test_fields_the_output_has_other_types_for_are_carried(folder, capsys):
+    pytest.importorskip("meshio")
+    surface = sm.read("surface.ply")
+    labels = np.arange(surface.n_faces, dtype=np.uint8)
+    sm.write("labels.vtu", surface, cell_data={"my labels": labels})
+    for suffix in (".xdmf", ".vtk"):
+        assert main(["conformal", "labels.vtu", "-o", f"map{suffix}", "-q"]) == 0
+        np.testing.assert_array_equal(read_arrays(f"map{suffix}").cell_data["my labels"], labels)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("command", "work"),
+    [
+        ("conformal", "conformal.map.conformal_map"),
+        ("area", "area.map.area_map"),
+        ("volume", "volume.map.volume_map"),
+        ("fill", "volume.fill.fill"),
+        ("register", "registration.map.register"),
+    ],
+)
+def test_what_the_output_cannot_hold_is_refused_before_the_work(
+    command, work, folder, capsys, monkeypatch
+):
+    pytest.importorskip("meshio")
+    solid = sm.read("solid.npz")
+    sm.write("four.npz", solid, point_data={"four": np.ones((solid.n_vertices, 4))})
+    np.savez("image.npz", ids=solid.boundary_vertices, image=solid.V[solid.boundary_vertices])
+    further = {"fill": ["--boundary", "image.npz"], "register": ["solid.npz"]}.get(command, [])
+    monkeypatch.setattr(f"stretchmap.{work}", lambda *_, **__: pytest.fail("work was begun"))
+    code, error = failing(capsys, command, "four.npz", *further, "-o", "map.xdmf", "-q")
+    assert code == 2 and error.startswith("map.xdmf: 'four' has 4 columns")
+    assert ".vtu or .npz" in error
