@@ -150,7 +150,8 @@ def _minimize(run: Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNe
                 free=free, asked=None if run.problem.warm else history.model.targets,
             )  # fmt: skip
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
-            history.budget = run.budget  # proven as it is: worth all the time there is
+            if certify(run.problem.solid, run.x, run.problem.torus).certified:
+                history.budget = run.budget  # proven as it is: worth all the time there is
             with run.timed("release"):
                 released = release(run)
             if released or not done.converged:

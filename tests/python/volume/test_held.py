@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -196,6 +197,12 @@ def solved_after_holding(problem, monkeypatch):
 def test_a_held_boundary_that_is_proven_gets_all_the_time_there_is(problem, monkeypatch):
     outcome = solved_after_holding(problem, monkeypatch)
     assert outcome.converged and not len(outcome.problem.held)
+
+
+def test_one_that_is_not_proven_makes_room_for_another_start(problem, monkeypatch):
+    monkeypatch.setattr(engine, "certify", lambda *_: SimpleNamespace(certified=False))
+    outcome = solved_after_holding(problem, monkeypatch)
+    assert not outcome.converged and outcome.stop_reason == "the time limit was reached"
 
 
 def test_one_that_cannot_be_released_is_gone_on_with_all_the_same(problem, monkeypatch):
