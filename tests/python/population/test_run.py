@@ -54,6 +54,12 @@ def serial(folder, tmp_path_factory):
     return sm.population.fit(folder, folder=tmp_path_factory.mktemp("serial"), **ROUNDS)
 
 
+@pytest.fixture(scope="module")
+def guided(folder, landmarks):
+    """The same by landmarks: most of the time goes to poses."""
+    return sm.population.fit(folder, landmarks=landmarks, **ROUNDS)
+
+
 def same(one, other):
     assert one.names == other.names and one.moved == other.moved
     for name in ("correspondences", "aligned"):
@@ -146,13 +152,13 @@ def test_a_finished_run_is_taken_up_as_it_is(serial, folder):
     assert times == {p: p.stat().st_mtime_ns for p in (serial.folder / "images").iterdir()}
 
 
-def test_a_run_killed_goes_on_with_the_same_bits(serial, folder, tmp_path):
+def test_a_run_killed_goes_on_with_the_same_bits(guided, folder, landmarks, tmp_path):
     script = (
         "import sys, stretchmap as sm\n"
-        f"sm.population.fit(sys.argv[1], folder=sys.argv[2], **{ROUNDS!r})\n"
+        f"sm.population.fit(sys.argv[1], landmarks=sys.argv[2], folder=sys.argv[3], **{ROUNDS!r})\n"
     )
     run = subprocess.Popen(
-        [sys.executable, "-c", script, str(folder), str(tmp_path)],
+        [sys.executable, "-c", script, str(folder), str(landmarks), str(tmp_path)],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
     )
     while not (tmp_path / "records" / "bone1-0.json").exists():
@@ -162,7 +168,7 @@ def test_a_run_killed_goes_on_with_the_same_bits(serial, folder, tmp_path):
     run.wait()
     done = sorted(p.name for p in (tmp_path / "records").iterdir())
     assert "bone2-1.json" not in done  # it was not over
-    same(serial, sm.population.fit(folder, folder=tmp_path, **ROUNDS))
+    same(guided, sm.population.fit(folder, landmarks=landmarks, folder=tmp_path, **ROUNDS))
 
 
 def test_a_pool_of_processes_gives_the_same_bits(serial, folder, tmp_path):
@@ -183,7 +189,9 @@ def test_a_job_that_kills_its_worker_is_given_up_and_the_others_are_not(tmp_path
 
 
 @pytest.mark.slow
-def test_a_dask_cluster_with_a_worker_killed_gives_the_same_bits(serial, folder, tmp_path):
+def test_a_dask_cluster_with_a_worker_killed_gives_the_same_bits(
+    guided, folder, landmarks, tmp_path
+):
     if importlib.util.find_spec("distributed") is None:
         pytest.skip("distributed is not installed")
     import distributed
@@ -202,9 +210,11 @@ def test_a_dask_cluster_with_a_worker_killed_gives_the_same_bits(serial, folder,
                 os.kill(pids[0], dying.KILL)
                 killed.append(pids[0])
 
-        found = sm.population.fit(folder, folder=tmp_path, executor=client, progress=kill, **ROUNDS)
+        found = sm.population.fit(
+            folder, landmarks=landmarks, folder=tmp_path, executor=client, progress=kill, **ROUNDS
+        )
         assert killed and killed[0] not in client.run(os.getpid).values()
-    same(serial, found)
+    same(guided, found)
 
 
 def test_landmarks_and_a_template_of_its_own(bones, tmp_path):
