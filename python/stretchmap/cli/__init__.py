@@ -11,7 +11,7 @@ exit code meaning
 0         success
 1         the computation failed, or a map is not certified
 2         bad input or bad usage
-130       interrupted
+130       interrupted, by Ctrl-C, SIGTERM or SIGHUP
 ========= ==================================================================
 """
 

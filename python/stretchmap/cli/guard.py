@@ -44,6 +44,9 @@ def guarded(run: Callable[[], object]) -> int:
             raise KeyboardInterrupt
         return code if isinstance(code, int) else SUCCESS
     except (KeyboardInterrupt, Cancelled):
+        # One that came out of an ``exec`` of a string, as dataclasses are made by, Python counts as
+        # unhandled until the next, and ends a module it runs by SIGINT whatever the exit code.
+        exec("")
         return _say("interrupted", INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output is gone; nothing more may be written, not even at exit.
@@ -62,7 +65,9 @@ def guarded(run: Callable[[], object]) -> int:
     except Exception as error:
         usage = getattr(error, "format_message", None)
         if usage is not None:  # raised by typer; where its class lives depends on the version
-            return _say(f"{usage()} Try --help.", MISUSED)
+            said = usage().rstrip()
+            said += "" if said.endswith((".", "?")) else "."
+            return _say(f"{said} Try --help.", MISUSED)
         if os.environ.get("STRETCHMAP_DEBUG"):
             raise
         name = type(error).__name__

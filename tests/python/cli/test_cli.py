@@ -182,6 +182,7 @@ def test_orientation_is_repaired_on_request(folder, capsys):
         (["volume", "solid.npz", "-o", "x.npz", "--ratio", "wide"], "'wide'"),
         (["volume", "solid.npz", "-o", "x.npz", "--c", "-1"], "c must be at least 0"),
         (["volume", "solid.npz", "-o", "x.npz", "--c", "much"], "'--c'"),
+        (["volume", "solid.npz", "-o", "x.npz", "--max-iter", "1e3"], ". Try --help."),
         (["volume", "solid.npz", "-o", "x.npz", "--method", "magic"], "magic"),
         (["volume", "solid.npz", "-o", "x.npz", "--c", "1", "--boundary", "glide"], "boundary"),
         (["volume", "surface.ply", "-o", "x.npz"], "stretchmap tet surface.ply"),

@@ -67,3 +67,16 @@ def test_a_long_call_that_never_returns_to_python_is_ended_too():
     assert run.returncode == 130
     assert time.perf_counter() - started < 15.0
     assert run.stderr == "stretchmap: interrupted\n"
+
+
+def test_an_interrupt_within_an_exec_has_the_same_exit_code(tmp_path):
+    script = (
+        "import sys\n"
+        "from stretchmap.cli.guard import guarded\n"
+        "sys.exit(guarded(lambda: exec('raise KeyboardInterrupt')))\n"
+    )
+    (tmp_path / "interrupted.py").write_text(script, encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, "-m", "interrupted"], cwd=tmp_path, capture_output=True, text=True, env=ENV
+    )
+    assert (run.returncode, run.stderr) == (130, "stretchmap: interrupted\n")
