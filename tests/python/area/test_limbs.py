@@ -22,9 +22,11 @@ def limb(rings: int) -> sm.TriMesh:
     return with_limb(sm.samples.torus_surface(36, 18), rings, 0.12)
 
 
-@pytest.mark.parametrize("rings", [30, 60, 130])
-def test_a_limb_is_mapped_without_a_fold(rings):
-    result = sm.area_map(limb(rings))
+@pytest.mark.parametrize(("rings", "time_limit"), [(30, 0.02), (60, 0.02), (130, 0.005)])
+def test_a_limb_is_mapped_without_a_fold(rings, time_limit):
+    """The longest, which is spread in the flat chart, with as many more faces as a quarter of the
+    time allows."""
+    result = sm.area_map(limb(rings), time_limit=time_limit)
     assert result.certificate.certified and result.distortion.flips == 0
 
 
