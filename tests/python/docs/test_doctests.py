@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import doctest
-import functools
 import importlib
 import pkgutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import ModuleType
-from typing import Any
 
 import pytest
 
 import stretchmap
-from stretchmap.mesh.meshes import TetMesh, TriMesh
+from computed_once import computed_once
+from stretchmap.population import pose
 
 OPTIONAL = {"plot": ("matplotlib",), "cli": ("typer",), "preparation": ("gpytoolbox", "tetgen")}
 
@@ -31,34 +30,6 @@ def load(name: str) -> ModuleType:
     return importlib.import_module(name)
 
 
-def key(argument: Any) -> Any:
-    """What tells arguments apart; raises TypeError for those that nothing tells apart."""
-    if isinstance(argument, TetMesh | TriMesh):
-        cells = argument.T if isinstance(argument, TetMesh) else argument.F
-        return type(argument), argument.V.tobytes(), cells.tobytes()
-    if isinstance(argument, list | tuple):
-        return tuple(map(key, argument))
-    if isinstance(argument, int | float | str | None):
-        return argument
-    raise TypeError
-
-
-def computed_once(function: Callable[..., Any]) -> Callable[..., Any]:
-    known: dict[Any, Any] = {}
-
-    @functools.wraps(function)
-    def call(*arguments: Any, **options: Any) -> Any:
-        try:
-            which = key(arguments), key([x for item in sorted(options.items()) for x in item])
-        except TypeError:
-            return function(*arguments, **options)
-        if which not in known:
-            known[which] = function(*arguments, **options)
-        return known[which]
-
-    return call
-
-
 @pytest.fixture(scope="module", autouse=True)
 def examples_share_what_they_start_from() -> Iterator[None]:
     """Results do not change, so that the same call of many examples needs to be made only once."""
@@ -67,6 +38,7 @@ def examples_share_what_they_start_from() -> Iterator[None]:
             (stretchmap, "volume_map"),
             (stretchmap, "register"),
             (stretchmap.population, "fit"),
+            (pose, "_ranked"),
             (stretchmap.samples, "vertebra_population"),
         ):
             patch.setattr(room, name, computed_once(getattr(room, name)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ import stretchmap as sm
 from shapes import a_map
 from stretchmap import samples
 from stretchmap.errors import OptionError, SolverError
+from stretchmap.resample import hexes
 from stretchmap.resample.hexes import hex_mesh
 from stretchmap.resample.layout import swept_layout
 
@@ -20,6 +23,22 @@ NUMBERS = {"sections": 24, "block": 3}
 def result():
     solid = samples.solid_torus(6000, R=3.0, r=1.0)
     return a_map(solid, solid.V, TORUS)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def grids_are_optimized_once() -> Iterator[None]:
+    """All are of one solid; layers are added to what is optimized."""
+    optimized, known = hexes.coarse_grid, {}
+
+    def coarse_grid(result, solid, candidates, *rest):
+        which = candidates.tobytes()
+        if which not in known:
+            known[which] = optimized(result, solid, candidates, *rest)
+        return known[which]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hexes, "coarse_grid", coarse_grid)
+        yield
 
 
 @pytest.mark.parametrize("rings", [1, 2])
