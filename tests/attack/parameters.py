@@ -58,7 +58,7 @@ PARAMETERS: dict[str, Parameter] = {
     "model": ("object", lambda s: s.population.model),
     "fit.template": ("object?", value(None)),
     "template": ("object", lambda s: s.solid),
-    "fit.landmarks": ("object?", value(None)),
+    "fit.landmarks": ("object?", lambda s: s.bone_marks),
     "correspond.start": ("array?", value(None)),
     "folder": ("folder?", value(None)),
     "executor": ("object?", value(None)),

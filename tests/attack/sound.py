@@ -79,13 +79,24 @@ class Sound:
         return sm.Landmarks.of(self.solid, self.solid, ids, ids)
 
     @functools.cached_property
+    def vertebrae(self) -> Any:
+        return sm.samples.vertebra_population(6, seed=2, n_tets=600)
+
+    @functools.cached_property
     def bones(self) -> tuple[sm.TetMesh, ...]:
-        return sm.samples.vertebra_population(6, seed=2, n_tets=600).solids[:3]
+        return self.vertebrae.solids[:3]
+
+    @functools.cached_property
+    def bone_marks(self) -> Any:
+        """Without them poses are searched for, which takes most of the time of a run."""
+        return self.vertebrae.landmarks[:3]
 
     @functools.cached_property
     def population(self) -> Any:
         folder = self.path("run")
-        return sm.population.fit(self.bones, folder=folder, max_rounds=1, tol=1.0)
+        return sm.population.fit(
+            self.bones, landmarks=self.bone_marks, folder=folder, max_rounds=1, tol=1.0
+        )
 
     @functools.cached_property
     def figure(self) -> Any:

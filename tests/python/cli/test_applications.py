@@ -210,7 +210,8 @@ def test_partition_command(folder):
 
 def test_resample_and_morph_commands(folder):
     pytest.importorskip("meshio")
-    assert run("resample", folder / "map.npz", "-o", folder / "grid.vtu", "--sections", 24) == 0
+    few = ("--sections", 24, "--block", 2, "--rings", 1)
+    assert run("resample", folder / "map.npz", "-o", folder / "grid.vtu", *few) == 0
     assert run("resample", folder / "map.npz", "-o", folder / "grid.stl") == 2
     assert run("morph", folder / "map.npz", "-o", folder / "m.pvd", "--frames", 3) == 0
     assert (folder / "m_002.vtu").exists()

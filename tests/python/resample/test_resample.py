@@ -67,10 +67,10 @@ def vertebra_grid(vertebra_map):
 
 
 def test_an_optimized_grid_is_valid_of_good_shape_and_fills_the_solid(bumpy_map):
-    raw = hex_mesh(bumpy_map, n_hexahedra=1500, optimize=False)
+    raw = hex_mesh(bumpy_map, n_hexahedra=1000, optimize=False)
     assert raw.moved == raw.boundary_moved == 0.0
-    mesh = hex_mesh(bumpy_map, n_hexahedra=1500)
-    assert 1200 < len(mesh.H) < 1800
+    mesh = hex_mesh(bumpy_map, n_hexahedra=1000)
+    assert 800 < len(mesh.H) < 1200
     assert mesh.n_invalid == 0 and mesh.valid.all()
     assert mesh.jacobians.max() <= 1.0 + 1e-12
     assert mesh.scaled_jacobians.min() > 0.35
@@ -108,7 +108,7 @@ def test_grids_of_very_long_solids_are_valid_and_do_not_swell(vertebra_map, seed
     assert abs(mesh.volume / long.volume - 1.0) < 0.02
 
 
-@pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (36, 3, 2)])
+@pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (20, 3, 2)])
 def test_grids_of_other_sizes_are_valid_too(vertebra_map, sections, block, rings):
     mesh = hex_mesh(vertebra_map, sections=sections, block=block, rings=rings)
     assert mesh.n_invalid == 0 and len(mesh.H) == sections * block * (block + 4 * rings)
