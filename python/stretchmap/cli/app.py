@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from .._version import __version__
+from .replacing import keeping_inputs
 
 
 def application(groups: Sequence[str]) -> typer.Typer:
@@ -24,6 +25,9 @@ def application(groups: Sequence[str]) -> typer.Typer:
     app.callback(invoke_without_command=True)(_start)
     for group in groups:
         importlib.import_module(f"{__package__}.{group}").register(app)
+    for command in app.registered_commands:
+        assert command.callback is not None
+        command.callback = keeping_inputs(command.callback)
     return app
 
 

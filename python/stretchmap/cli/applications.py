@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +14,7 @@ import typer
 from ..errors import MeshError, OptionError
 from . import common
 from .common import Compact, Input, Json, MapFile, Orient, Output, Quiet, Threads
+from .replacing import Written
 from .results import conclude
 
 if TYPE_CHECKING:
@@ -79,8 +81,7 @@ def register_solids(
     from ..registration.landmarks import read_landmarks
     from ..registration.map import register as register_meshes
 
-    inputs = [path for path in (input, target, landmarks) if path is not None]
-    common.check_outputs(output, common.map_suffixes(), json, *inputs)
+    common.check_outputs(output, common.map_suffixes(), json)
     watch = common.Stopwatch()
     source, fields = _solid_torus(input, orient, compact)
     fields = common.check_fields(output, source, fields)
@@ -129,7 +130,7 @@ def coordinates(
     from ..base.files import atomic_path
     from ..io.numbers import read_numbers
 
-    common.check_output(output, (".csv",), map_file, points)
+    common.check_output(output, (".csv",))
     result = _solid_map(map_file, "coordinates")
     ends = [result.mesh.V, result.image]
     if points is not None:
@@ -179,7 +180,7 @@ def partition(
     from ..io.formats import suffixes
     from ..partitions.parts import partition as cut
 
-    common.check_outputs(output, suffixes(solid=True), json, map_file)
+    common.check_outputs(output, suffixes(solid=True), json)
     loaded = _solid_map(map_file, "partition")
     axes: Any = [name.strip() for name in by.split(",")]  # checked there
     shares = [_shares(entry) for entry in fractions.split(":")]
@@ -225,7 +226,7 @@ def resample(
     from ..resample.hex_files import HEX_SUFFIXES
     from ..resample.hexes import hex_mesh
 
-    common.check_outputs(output, HEX_SUFFIXES, json, map_file)
+    common.check_outputs(output, HEX_SUFFIXES, json)
     result = _solid_map(map_file, "resample")
     with terminal(quiet) as bar:
         mesh = hex_mesh(
@@ -250,7 +251,7 @@ def resample(
 
 def morph(
     map_file: MapFile,
-    output: Output,
+    output: Annotated[Output, Written(_frames)],
     frames: Annotated[int, typer.Option(help="Number of frames, both ends included.")] = 21,
     quiet: Quiet = False,
 ) -> None:
@@ -260,13 +261,19 @@ def morph(
     """
     from ..plot.morphing import morph as homotopy
 
-    common.check_output(output, (".pvd", ".gif"), map_file)
+    common.check_output(output, (".pvd", ".gif"))
     result = homotopy(_solid_map(map_file, "morph"), frames)
     written = result.save(output)
     if not quiet:
         typer.echo(result.summary())
         beside = f" with {len(written) - 1} frames beside it" if len(written) > 1 else ""
         typer.echo(f"written to {output}{beside}")
+
+
+def _frames(given: Mapping[str, Any]) -> list[Path]:
+    from ..plot.morphing import frame_files
+
+    return frame_files(given["output"], given["frames"])
 
 
 def _solid_torus(path: Path, orient: bool, compact: bool) -> tuple[TetMesh, common.Fields]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ArrayError, FileFormatError, MeshError, MissingDependencyError, OptionError
+from .replacing import Written
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TetMesh, TriMesh
@@ -34,8 +35,9 @@ MapFile = Annotated[
         show_default=False,
     ),
 ]
-Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.", show_default=False)]
-Json = Annotated[Path | None, typer.Option("--json", help="Write the figures as JSON.")]
+_OUTPUT = typer.Option("-o", "--output", help="File to write.", show_default=False)
+Output = Annotated[Path, _OUTPUT, Written()]
+Json = Annotated[Path | None, typer.Option("--json", help="Write the figures as JSON."), Written()]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No table and no progress bar.")]
 Orient = Annotated[bool, typer.Option("--orient", help="Turn elements oriented the wrong way.")]
 Threads = Annotated[
@@ -164,7 +166,7 @@ def require_solid(mesh: TriMesh | TetMesh, path: Path, command: str) -> TetMesh:
     )
 
 
-def check_output(path: Path, allowed: tuple[str, ...], *others: Path | None) -> None:
+def check_output(path: Path, allowed: tuple[str, ...]) -> None:
     """Refuse an output that could not be written, before anything is computed.
 
     Parameters
@@ -173,8 +175,6 @@ def check_output(path: Path, allowed: tuple[str, ...], *others: Path | None) -> 
         Where the output is to go.
     allowed : tuple of str
         Suffixes that will do.
-    others : Path or None
-        Files it must not replace: inputs and other outputs.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def check_output(path: Path, allowed: tuple[str, ...], *others: Path | None) -> 
     MissingDependencyError
         The format needs a package that is not installed.
     OptionError
-        It is one of the other files, or ``-``.
+        It is ``-``.
     OSError
         The folder is missing or not writable, or the path is a folder.
     """
@@ -204,22 +204,22 @@ def check_output(path: Path, allowed: tuple[str, ...], *others: Path | None) -> 
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
     if not _writable(folder) or (path.exists() and not _writable(path)):
         raise PermissionError(errno.EACCES, "cannot be written", str(path))
-    for other in others:
-        if other is not None and path.resolve() == other.resolve():
-            raise OptionError(f"{path} would be replaced by the output; choose another name")
 
 
 def _writable(path: Path) -> bool:
     return os.access(path, os.W_OK)
 
 
-def check_outputs(
-    output: Path, allowed: tuple[str, ...], json_path: Path | None, *inputs: Path
-) -> None:
+def check_outputs(output: Path, allowed: tuple[str, ...], json_path: Path | None) -> None:
     """:func:`check_output` for an output and the JSON report beside it."""
-    check_output(output, allowed, *inputs)
-    if json_path is not None:
-        check_output(json_path, (json_path.suffix.lower(),), output, *inputs)
+    check_output(output, allowed)
+    check_json(json_path)
+
+
+def check_json(path: Path | None) -> None:
+    """:func:`check_output` for a JSON report, if asked for; its suffix may be any."""
+    if path is not None:
+        check_output(path, (path.suffix.lower(),))
 
 
 def map_suffixes() -> tuple[str, ...]:

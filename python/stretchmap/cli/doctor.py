@@ -37,8 +37,7 @@ def doctor(json: Json = None, quiet: Quiet = False) -> None:
     """Print versions and packages, and test a map."""
     from ..base.tables import plain, table, versions
 
-    if json is not None:
-        common.check_output(json, (json.suffix.lower(),))
+    common.check_json(json)
     report: dict[str, Any] = {
         **versions(),
         "platform": platform.platform(),

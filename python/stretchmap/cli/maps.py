@@ -45,7 +45,7 @@ def conformal(
     from ..base.threads import threads as use_threads
     from ..conformal.map import conformal_map
 
-    common.check_outputs(output, common.map_suffixes(), json, input)
+    common.check_outputs(output, common.map_suffixes(), json)
     watch = common.Stopwatch()
     mesh, fields = common.read_with_fields(input, orient, compact)
     surface, fields = common.surface_with_fields(mesh, fields)
@@ -87,7 +87,7 @@ def area(
     from ..area.map import area_map
     from ..base.progress import terminal
 
-    common.check_outputs(output, common.map_suffixes(), json, input)
+    common.check_outputs(output, common.map_suffixes(), json)
     watch = common.Stopwatch()
     options: dict[str, Any] = {
         "finish": None if finish is None else finish.value,
@@ -130,8 +130,7 @@ def certify(
     from ..base.torus import Torus
     from ..certificate.checks import certify_file
 
-    if json is not None:
-        common.check_output(json, (json.suffix.lower(),), map_file)
+    common.check_json(json)
     certificate = certify_file(
         map_file, None if torus is None else Torus(*torus), tolerance=tolerance
     )

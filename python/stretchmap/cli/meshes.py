@@ -11,6 +11,7 @@ import typer
 from . import common
 from .common import Compact, Input, Json, Orient, Output, Quiet
 from .guard import in_words_of_the_command_line
+from .replacing import Written
 
 if TYPE_CHECKING:
     import numpy as np
@@ -46,8 +47,7 @@ def info(
     from ..mesh.crossings import require_no_crossing
     from ..mesh.meshes import TetMesh
 
-    if json is not None:
-        common.check_output(json, (json.suffix.lower(),), input)
+    common.check_json(json)
     mesh = common.read_mesh(input, orient, compact)
     diagnosis = mesh.diagnose()
     obstacle = ""
@@ -93,6 +93,7 @@ def homology(
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="File (.npz) for loops and forms.", show_default=False),
+        Written(),
     ] = None,
     json: Json = None,
     orient: Orient = False,
@@ -108,9 +109,8 @@ def homology(
     from ..mesh.meshes import TetMesh
 
     if output is not None:
-        common.check_outputs(output, (".npz",), json, input)
-    elif json is not None:
-        common.check_output(json, (json.suffix.lower(),), input)
+        common.check_output(output, (".npz",))
+    common.check_json(json)
     watch = common.Stopwatch()
     mesh = common.read_mesh(input, orient, compact)
     surface = common.surface_of(mesh)
@@ -166,7 +166,7 @@ def prepare(
     from ..preparation.pipeline import prepare as prepare_surface
     from ..preparation.voxels import holds_mask, read_mask
 
-    common.check_outputs(output, io.suffixes(solid=True), json, raw)
+    common.check_outputs(output, io.suffixes(solid=True), json)
     common.require_package("gpytoolbox", "remeshing", "prepare")
     given: Any
     affine = None
@@ -236,7 +236,7 @@ def tet(
     from ..mesh.meshes import TetMesh
     from ..samples import tetrahedralize
 
-    common.check_output(output, io.suffixes(solid=True), input)
+    common.check_output(output, io.suffixes(solid=True))
     common.require_package("tetgen", "filling a surface with tets", "mesh")
     surface = common.read_mesh(input, orient, compact)
     if isinstance(surface, TetMesh):

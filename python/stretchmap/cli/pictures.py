@@ -12,12 +12,14 @@ import typer
 
 from . import common
 from .common import Json, MapFile, Output, Quiet
+from .replacing import Written
 
 if TYPE_CHECKING:
     from ..mesh.meshes import TetMesh
 
 
 _DPI = 150.0
+_DEMO = ("map.npz", "ratios.png", "torus.png")  # what it leaves in its folder
 
 
 class Kind(str, Enum):
@@ -86,7 +88,7 @@ def plot(
     from ..maps.files import load_map
     from ..plot import picture, save
 
-    common.check_output(output, (".png", ".pdf", ".svg"), map_file)
+    common.check_output(output, (".png", ".pdf", ".svg"))
     common.require_package("matplotlib", "drawing", "plot")
     given = {"by": by, "color": color}
     options = {name: value.value for name, value in given.items() if value is not None}
@@ -101,14 +103,16 @@ def report(map_file: MapFile, output: Output) -> None:
     from ..maps.files import load_map
     from ..plot.report import write_report
 
-    common.check_output(output, (".html", ".htm"), map_file)
+    common.check_output(output, (".html", ".htm"))
     common.require_package("matplotlib", "drawing", "plot")
     write_report(load_map(map_file), output, source=map_file.name)
 
 
 def demo(
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder for the results, made if missing.")
+        Path,
+        typer.Option("-o", "--output", help="Folder for the results, made if missing."),
+        Written(lambda given: [given["output"] / name for name in _DEMO]),
     ] = Path("stretchmap-demo"),
     sample: Annotated[Sample, typer.Option(help="Which solid.")] = Sample.vertebra,
     n_tets: Annotated[int, typer.Option(help="Number of tets aimed at.", min=300)] = 30_000,
@@ -128,8 +132,7 @@ def demo(
     common.require_package("matplotlib", "the demo's pictures", "plot")
     if output.exists() and not output.is_dir():
         raise NotADirectoryError(20, "is a file, not a folder", str(output))
-    if json is not None:
-        common.check_output(json, (json.suffix.lower(),))
+    common.check_json(json)
     makers: dict[Sample, Callable[[int], TetMesh]] = {
         Sample.vertebra: samples.vertebra_like,
         Sample.bumpy: samples.bumpy_torus,
@@ -145,12 +148,13 @@ def demo(
     histogram, torus = plot.ratios(result), plot.cutaway(result)
     watch.lap("pictures")
     output.mkdir(parents=True, exist_ok=True)
-    common.check_output(output / "map.npz", (".npz",))
-    pictures = {output / "ratios.png": histogram, output / "torus.png": torus}
+    place, *drawn = (output / name for name in _DEMO)
+    common.check_output(place, (".npz",))
+    pictures = dict(zip(drawn, (histogram, torus), strict=True))
     with ExitStack() as stack:  # all files or none
         for path, figure in pictures.items():
             figure.savefig(stack.enter_context(atomic_path(path)), dpi=_DPI)
-        conclude(result, output / "map.npz", json, quiet, watch)
+        conclude(result, place, json, quiet, watch)
     if not quiet:
         for path in pictures:
             typer.echo(f"written to {path}")

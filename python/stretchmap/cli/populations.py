@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from . import common
 from .common import Json, Quiet
+from .replacing import Written
 
 if TYPE_CHECKING:
     from ..population.result import Population
 
 _log = logging.getLogger("stretchmap")
+
+_RESULTS = ("population.npz", "mean.npz", "report.html")
 
 
 class Along(str, Enum):
@@ -23,6 +27,14 @@ class Along(str, Enum):
 
     smooth = "smooth"
     area = "area"
+
+
+def _run_files(given: Mapping[str, Any]) -> list[Path]:
+    """What a run writes into its folder, and folders that are its own."""
+    folder = given["output"]
+    names = ["run.json", "maps", "images", "records", *_RESULTS]
+    names += [f"template-{number}.npz" for number in range(min(given["max_rounds"], 1000))]
+    return [folder / name for name in names]
 
 
 def register(app: typer.Typer) -> None:
@@ -37,9 +49,10 @@ def population(
     output: Annotated[
         Path,
         typer.Option("-o", "--output", help="Run folder; begun runs go on.", show_default=False),
+        Written(_run_files),
     ],
     template: Annotated[
-        str | None,
+        Path | None,
         typer.Option(help="Name of a shape, or a mesh, to start from.", show_default=False),
     ] = None,
     landmarks: Annotated[
@@ -71,12 +84,11 @@ def population(
     from ..population.run import fit
 
     common.require_package("matplotlib", "the report", "plot")
-    if json is not None:
-        common.check_output(json, (json.suffix.lower(),))
+    common.check_json(json)
     with terminal(quiet) as bar:
         found = fit(
             solids,
-            template,
+            None if template is None else str(template),
             landmarks,
             folder=output,
             executor=executor,
@@ -86,9 +98,10 @@ def population(
             tol=tol,
             progress=bar,
         )
-    found.save(output / "population.npz")
-    write(output / "mean.npz", found.mean)
-    write_population_report(found, output / "report.html", str(solids.name))
+    shapes, mean, page = (output / name for name in _RESULTS)
+    found.save(shapes)
+    write(mean, found.mean)
+    write_population_report(found, page, str(solids.name))
     common.write_json(json, found.to_dict())
     if not quiet:
         typer.echo(found.summary())

@@ -105,7 +105,7 @@ def volume(
     from ..volume.map import volume_map
     from ..volume.options import VolumeOptions
 
-    common.check_outputs(output, common.map_suffixes(), json, input)
+    common.check_outputs(output, common.map_suffixes(), json)
     watch = common.Stopwatch()
     route: dict[str, Any] = {
         "method": None if method is None else method.value,
@@ -168,7 +168,7 @@ def fill(
     from ..volume.fill import fill as fill_solid
     from ..volume.options import FillOptions
 
-    common.check_outputs(output, common.map_suffixes(), json, input)
+    common.check_outputs(output, common.map_suffixes(), json)
     watch = common.Stopwatch()
     mesh, fields = common.read_with_fields(input, orient, compact)
     solid = common.require_solid(mesh, input, "fill")

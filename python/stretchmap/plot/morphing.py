@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from ..maps.result import MapResult
 
-__all__ = ["Morph", "morph"]
+__all__ = ["Morph", "frame_files", "morph"]
 
 _MOST_FRAMES = 10_000
 _COLLECTION = """<?xml version="1.0"?>
@@ -121,7 +121,7 @@ class Morph(HasSummary):
         raise FileFormatError(f"{path}: a morph is written as .pvd or .gif")
 
     def _save_frames(self, path: Path) -> list[Path]:
-        frames = [path.with_name(f"{path.stem}_{i:03d}.vtu") for i in range(len(self.times))]
+        frames = frame_files(path, len(self.times))
         lines = [
             f'    <DataSet timestep="{t:.6g}" file={quoteattr(frame.name)}/>'
             for t, frame in zip(self.times, frames, strict=True)
@@ -206,6 +206,20 @@ class Morph(HasSummary):
         with atomic_path(path) as temporary:
             animation.save(temporary, writer=PillowWriter(fps=12))
         return [path]
+
+
+def frame_files(path: Path, frames: int) -> list[Path]:
+    """Files of the frames of a morph beside its ``.pvd``; a picture has none.
+
+    Parameters
+    ----------
+    path : Path
+    frames : int
+        Their number; beyond what a morph can have there are no more.
+    """
+    if path.suffix.lower() != ".pvd":
+        return []
+    return [path.with_name(f"{path.stem}_{i:03d}.vtu") for i in range(min(frames, _MOST_FRAMES))]
 
 
 def morph(result: MapResult, frames: int = 21, *, align: bool = True) -> Morph:
