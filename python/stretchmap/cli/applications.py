@@ -99,11 +99,7 @@ def register_solids(
             progress=bar,
         )
     watch.lap("compute")
-    conclude(result.with_fields(*fields), output, json, quiet, watch)
-    if not result.certificate.certified:
-        _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
-        return 1
-    return 0
+    return conclude(result.with_fields(*fields), output, json, quiet, watch)
 
 
 def coordinates(

@@ -37,10 +37,11 @@ def conformal(
     orient: Orient = False,
     compact: Compact = False,
     quiet: Quiet = False,
-) -> None:
+) -> int:
     """Map a surface conformally onto a torus.
 
-    The surface, or the boundary of the solid given, has genus one.
+    The surface, or the boundary of the solid given, has genus one; exit code 1 if the map is not
+    certified.
     """
     from ..base.threads import threads as use_threads
     from ..conformal.map import conformal_map
@@ -54,7 +55,7 @@ def conformal(
     with use_threads(threads):
         result = conformal_map(surface)
     watch.lap(**result.seconds)
-    conclude(result.with_fields(*fields), output, json, quiet, watch)
+    return conclude(result.with_fields(*fields), output, json, quiet, watch)
 
 
 def area(
@@ -79,10 +80,11 @@ def area(
     orient: Orient = False,
     compact: Compact = False,
     quiet: Quiet = False,
-) -> None:
+) -> int:
     """Map a surface onto a torus, areas preserved.
 
-    The surface, or the boundary of the solid given, has genus one.
+    The surface, or the boundary of the solid given, has genus one; exit code 1 if the map is not
+    certified.
     """
     from ..area.map import area_map
     from ..base.progress import terminal
@@ -105,7 +107,7 @@ def area(
     with terminal(quiet) as bar:
         result = area_map(surface, **options, refine=refine, threads=threads, progress=bar)
     watch.lap(**result.seconds)
-    conclude(result.with_fields(*fields), output, json, quiet, watch)
+    return conclude(result.with_fields(*fields), output, json, quiet, watch)
 
 
 def certify(

@@ -118,7 +118,7 @@ def demo(
     n_tets: Annotated[int, typer.Option(help="Number of tets aimed at.", min=300)] = 30_000,
     json: Json = None,
     quiet: Quiet = False,
-) -> None:
+) -> int:
     """Generate a solid, map it, draw it.
 
     Needs no data.
@@ -154,7 +154,8 @@ def demo(
     with ExitStack() as stack:  # all files or none
         for path, figure in pictures.items():
             figure.savefig(stack.enter_context(atomic_path(path)), dpi=_DPI)
-        conclude(result, place, json, quiet, watch)
+        code = conclude(result, place, json, quiet, watch)
     if not quiet:
         for path in pictures:
             typer.echo(f"written to {path}")
+    return code

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,8 @@ from . import common
 if TYPE_CHECKING:
     from ..certificate.findings import Certificate
     from ..maps.result import MapResult
+
+_log = logging.getLogger("stretchmap")
 
 Ratio = Annotated[
     str | None,
@@ -38,8 +41,14 @@ def parsed_ratio(ratio: str | None) -> Any:
 
 def conclude(
     result: MapResult, output: Path, json_path: Path | None, quiet: bool, watch: common.Stopwatch
-) -> None:
-    """Certify if that has not been done, write output and report, print the table."""
+) -> int:
+    """Certify if that has not been done, write output and report, print the table.
+
+    Returns
+    -------
+    int
+        Exit code: 1 if the map is not certified.
+    """
     from ..base.tables import table
 
     report = result.to_dict(history=True)
@@ -58,6 +67,10 @@ def conclude(
         rows |= {f"seconds, {stage}": value for stage, value in report["seconds"].items()}
         typer.echo(table(rows))
         typer.echo(f"written to {output}")
+    if report["certified"]:
+        return 0
+    _log.error("not certified: %s; map kept in %s", report["reason"], output)
+    return 1
 
 
 def _certified(result: MapResult) -> Certificate:

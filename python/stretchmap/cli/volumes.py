@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
     from ..maps.files import LoadedMap
     from ..mesh.meshes import TetMesh
-
-_log = logging.getLogger("stretchmap")
 
 
 class Method(str, Enum):
@@ -129,11 +126,7 @@ def volume(
             threads=threads, progress=bar, **route,
         )  # fmt: skip
     watch.lap(**result.seconds)
-    conclude(result.with_fields(*fields), output, json, quiet, watch)
-    if result.method == "certified" and not result.certificate.certified:
-        _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
-        return 1
-    return 0
+    return conclude(result.with_fields(*fields), output, json, quiet, watch)
 
 
 def fill(
@@ -181,11 +174,7 @@ def fill(
             threads=threads, progress=bar,
         )  # fmt: skip
     watch.lap(**result.seconds)
-    conclude(result.with_fields(*fields), output, json, quiet, watch)
-    if not result.certificate.certified:
-        _log.error("not certified: %s; best map kept in %s", result.certificate.reason, output)
-        return 1
-    return 0
+    return conclude(result.with_fields(*fields), output, json, quiet, watch)
 
 
 def prescribed_image(solid: TetMesh, path: Path) -> NDArray[np.float64]:

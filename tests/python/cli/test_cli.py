@@ -296,9 +296,41 @@ def test_keep_best_keeps_an_uncertified_map_and_still_exits_1(folder, capsys, mo
     code = main(["volume", "solid.npz", "-o", "x.npz", "--json", "x.json", "--max-iter", "1", "-q",
                  "--keep-best"])  # fmt: skip
     assert code == 1
-    assert "best map kept in x.npz" in capsys.readouterr().err
+    assert "map kept in x.npz" in capsys.readouterr().err
     assert json.loads((folder / "x.json").read_text())["certified"] is False
     assert sm.load_map("x.npz").mesh.n_vertices > 0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["conformal", "coarse.npz"],
+        ["area", "coarse.npz", "--finish", "none"],
+        ["volume", "knot.npz", "--c", "10", "--max-iter", "1"],
+    ],
+)
+def test_maps_that_are_proven_afterwards_are_kept_with_exit_1(
+    tmp_path, monkeypatch, capsys, arguments
+):
+    monkeypatch.chdir(tmp_path)
+    sm.write("coarse.npz", samples.torus_surface(3, 3))
+    sm.write("knot.npz", samples.knot_tube(600))
+    assert main([*arguments, "-o", "x.npz", "--json", "x.json", "-q"]) == 1
+    report = json.loads(Path("x.json").read_text())
+    assert report["certified"] is False and report["flips"] > 0
+    said = f"stretchmap: error: not certified: {report['reason']}; map kept in x.npz\n"
+    assert capsys.readouterr().err.endswith(said)
+    assert sm.load_map("x.npz").distortion.flips == report["flips"]
+
+
+def test_what_cannot_be_printed_leaves_the_map_written(folder, capsys, monkeypatch):
+    def full(text):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("typer.echo", full)
+    assert main(["conformal", "surface.ply", "-o", "x.npz"]) == 1
+    assert os.strerror(errno.ENOSPC) in capsys.readouterr().err
+    assert sm.load_map("x.npz").distortion.flips == 0
 
 
 def test_info_lists_every_defect_and_reads_what_cannot_be_mapped(folder, capsys):
