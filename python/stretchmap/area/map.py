@@ -12,7 +12,7 @@ from ..base.budget import Budget
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
-from ..base.torus import MOST_ANGLE, TWO_PI, Torus
+from ..base.torus import MOST_ANGLE, MOST_RATIO, TWO_PI, Torus
 from ..conformal.map import ConformalMap, conformal_map
 from ..errors import CertificationError, OptionError
 from ..homology.basis import HomologyBasis
@@ -74,8 +74,8 @@ def area_map(
     phase : float, optional
         Turns to add to the equal-area coordinate around the tube; searched if left out.
     ratio : "conformal", "search" or float
-        ``R / r``: that of the conformal map, the best found by a search, or given (above 1). Not
-        together with ``torus``.
+        ``R / r``: that of the conformal map, the best found by a search, or given, above 1 and at
+        most 1e6, beyond which coordinates are too coarse for the tube. Not together with ``torus``.
     finish : "ring", "face" or "none"
         ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then, where
         their SD is at most twice ``tol``, a projection that makes the area of every vertex ring
@@ -297,9 +297,10 @@ def _check_options(
     if isinstance(ratio, str):
         one_of("ratio", ratio, ("conformal", "search"))
     else:
-        real("ratio", ratio, above=1.0)
+        real("ratio", ratio, above=1.0, high=MOST_RATIO)
     if torus is not None:
         instance("torus", torus, Torus, "Torus(R, r)")
+        real("R / r of torus", torus.ratio, high=MOST_RATIO)
         if ratio != "conformal":
             raise OptionError("give the torus or the ratio of its radii, not both")
     one_of("finish", finish, ("ring", "face", "none"))

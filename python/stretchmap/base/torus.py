@@ -16,6 +16,9 @@ __all__ = ["Torus"]
 
 TWO_PI = 2.0 * math.pi
 MOST_ANGLE = 1e3  # given, in radians or turns; far beyond, rounding would show
+# R / r of maps: beyond three times that coordinates are rounded by more than the 1e-9 r by which
+# `certify` lets points be off the torus.
+MOST_RATIO = 1e6
 
 
 def wrapped(turns: NDArray[np.float64]) -> NDArray[np.float64]:

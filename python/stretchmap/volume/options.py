@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..area.search import Ratio
 from ..base.options import SOLVERS, flag, instance, one_of, real, shown, whole
-from ..base.torus import MOST_ANGLE
+from ..base.torus import MOST_ANGLE, MOST_RATIO
 from ..errors import OptionError
 
 __all__ = [
@@ -199,7 +199,7 @@ class VolumeOptions(FillOptions):
         if isinstance(self.ratio, str):
             one_of("ratio", self.ratio, ("conformal", "search"))
         elif self.ratio is not None:
-            real("ratio", self.ratio, above=1.0)
+            real("ratio", self.ratio, above=1.0, high=MOST_RATIO)
         if self.phase is not None:
             real("phase", self.phase, -MOST_ANGLE, MOST_ANGLE)
         if self.tol is not None:

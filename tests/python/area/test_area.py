@@ -244,6 +244,8 @@ def test_saved_map_comes_back(bumpy: TriMesh, tmp_path) -> None:
     [
         {"ratio": "best"},
         {"ratio": 1.0},
+        {"ratio": 1.1e6},
+        {"torus": stretchmap.Torus(1.0, 1e-7)},
         {"phase": np.nan},
         {"finish": "all"},
         {"max_iter": -1},
@@ -257,6 +259,12 @@ def test_saved_map_comes_back(bumpy: TriMesh, tmp_path) -> None:
 def test_options_out_of_range(bumpy: TriMesh, options: dict) -> None:
     with pytest.raises(OptionError):
         area_map(bumpy, **options)
+
+
+@pytest.mark.parametrize("ratio", [1.0 + 1e-15, 1.001, 1e3, 1e6])
+def test_the_thinnest_and_the_thickest_torus_hold_their_maps(bumpy: TriMesh, ratio: float) -> None:
+    result = area_map(bumpy, ratio=ratio, finish="none")
+    assert result.certificate.checks["on_torus"] and result.ratio == pytest.approx(ratio, rel=1e-12)
 
 
 def test_a_chart_has_converged_where_its_energy_is_at_rest(bumpy: TriMesh, caplog) -> None:

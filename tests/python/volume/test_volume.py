@@ -434,6 +434,9 @@ def test_a_start_of_another_mesh_is_refused(bumpy):
     [
         ("floor", 2.0),
         ("phase", 1e300),
+        ("ratio", 1.0),
+        ("ratio", 1.1e6),
+        ("ratio", 1e300),
         ("tol", 5.0),
         ("patience", 0),
         ("untangle_iter", 1.5),
