@@ -214,7 +214,9 @@ def damped_solve(
     gradient: NDArray[np.float64], hessian: sp.csr_matrix, *, tol: float = 0.0
 ) -> NDArray[np.float64]:
     """Newton step for a Hessian that is positive semi-definite only; by a factorization, or by
-    conjugate gradients to a relative residual of ``tol``."""
+    conjugate gradients to a relative residual of ``tol``. Where nothing is free it is empty."""
+    if not len(gradient):
+        return np.empty(0)
     diagonal = hessian.diagonal()
     matrix = (hessian + sp.diags(1e-6 * diagonal + 1e-12 * diagonal.mean())).tocsr()
     matrix.sort_indices()

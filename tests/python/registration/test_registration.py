@@ -255,6 +255,15 @@ def test_cover_derivatives_match_finite_differences():
     assert slope == pytest.approx(gradient @ direction.ravel(), rel=1e-5)
 
 
+@pytest.mark.filterwarnings("error")
+def test_where_all_vertices_are_held_there_is_no_step():
+    flat = FlatSurface.of(samples.torus_surface(12, 8))
+    problem = SurfaceProblem(flat, flat)
+    problem.held[:] = True
+    for tangent in (False, True):
+        assert not problem.newton_step(flat.turns, flat.surface.V, tangent).any()
+
+
 def test_a_step_is_shortened_only_where_faces_would_fold():
     flat = FlatSurface.of(samples.torus_surface(24, 12))
     problem = SurfaceProblem(flat, flat)
