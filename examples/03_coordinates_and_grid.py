@@ -36,7 +36,7 @@ angle = plot.cutaway(result)
 
 # %%
 # A grid of the solid torus pulled back.
-grid = hex_mesh(result, sections=24)
+grid = hex_mesh(result, sections=24, block=2, rings=2)
 print(grid.summary())
 assert grid.n_invalid == 0
 if len(sys.argv) > 1:

@@ -74,7 +74,7 @@ parts.save(folder / "parts.vtu")
 # A structured grid of hexahedra, for a solver that likes them: ``.inp`` for Abaqus and CalculiX,
 # ``.bdf`` for Nastran, ``.msh`` for Gmsh again.
 
-grid = sm.hex_mesh(result, sections=24)
+grid = sm.hex_mesh(result, sections=24, block=2, rings=2)
 print(grid.summary())
 assert grid.n_invalid == 0
 grid.save(folder / "part.inp")

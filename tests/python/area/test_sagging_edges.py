@@ -376,7 +376,7 @@ def mapped(seed: int) -> sm.AreaMap:
     return sm.area_map(small_handle(seed))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", [3, 4])
 def test_barriers_as_heavy_as_the_error_leave_steps_long(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
