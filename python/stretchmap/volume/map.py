@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..area.map import area_map
+from ..base.arrays import as_points
 from ..base.options import callback, flag, instance
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import Torus
 from ..certificate.findings import require_certified
-from ..errors import KindError, OptionError
+from ..errors import ArrayError, KindError, OptionError
 from ..maps.result import MapResult
 from ..mesh.crossings import UNLESS_KEPT, require_no_crossing
 from ..mesh.given import as_solid, require_same_mesh
@@ -124,7 +125,7 @@ def volume_map(
     KindError
         ``start`` belongs to another mesh, or names no torus.
     ArrayError, NonFiniteError, OrientationError
-        The optimizer returned no image, or one without positive volume.
+        The optimizer returned no image, or one without positive volume; or ``start`` holds one.
     OptionError
         An option out of range or combined with one it excludes.
     SolverError
@@ -278,8 +279,13 @@ def _of_the_input(solid: TetMesh, start: MapResult, progress: Progress | None) -
 
 
 def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], Torus]:
+    image = as_points(start.image, "the image of start")
+    if len(image) != start.mesh.n_vertices:
+        raise ArrayError(
+            f"the image of start has {len(image)} rows, its mesh {start.mesh.n_vertices} vertices"
+        )
     if isinstance(start.mesh, TetMesh) and _refines(start.mesh, solid):
-        return start.image[: solid.n_vertices], _torus_of(start)
+        return image[: solid.n_vertices], _torus_of(start)
     mesh = solid if isinstance(start.mesh, TetMesh) else solid.surface
     require_same_mesh(
         mesh,
@@ -287,7 +293,7 @@ def _start_of(solid: TetMesh, start: MapResult) -> tuple[NDArray[np.float64], To
         "start is of another surface or solid",
         "pass a map of the solid or its surface",
     )
-    return start.image, _torus_of(start)
+    return image, _torus_of(start)
 
 
 def _torus_of(start: MapResult) -> Torus:

@@ -16,8 +16,10 @@ import stretchmap as sm
 from shapes import mug
 from stretchmap import _core, samples
 from stretchmap.errors import (
+    ArrayError,
     DegenerateError,
     KindError,
+    NonFiniteError,
     OptionError,
     SelfIntersectionError,
     SolverError,
@@ -427,6 +429,23 @@ def test_a_start_of_another_mesh_is_refused(bumpy):
     other = sm.area_map(samples.torus_surface(12, 8))
     with pytest.raises(KindError, match="of another surface"):
         sm.volume_map(bumpy, start=other)
+
+
+@pytest.mark.parametrize("of_surface", [False, True])
+def test_a_start_with_a_broken_image_is_refused_for_what_it_is(of_surface):
+    solid = samples.bumpy_torus(600)
+    start = sm.volume_map(solid, c=0.0, max_iter=0)
+    if of_surface:
+        start = start.boundary_map
+    lost = np.array(start.image)
+    lost[7, 1] = np.nan
+    with pytest.raises(NonFiniteError, match="the image of start"):
+        sm.volume_map(solid, start=dataclasses.replace(start, image=lost))
+    for image in (start.image[:10], np.vstack([start.image, start.image])):
+        with pytest.raises(ArrayError, match=f"the image of start has {len(image)} rows"):
+            sm.volume_map(solid, start=dataclasses.replace(start, image=image))
+    with pytest.raises(ArrayError, match="the image of start"):
+        sm.volume_map(solid, start=dataclasses.replace(start, image=start.image[:, :2]))
 
 
 @pytest.mark.parametrize(
