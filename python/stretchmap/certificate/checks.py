@@ -43,14 +43,17 @@ from ..base.torus import TWO_PI, Torus
 from ..errors import MeshError
 from ..maps.files import load_map
 from ..measures.orientation import chart_areas, outward_areas
+from ..mesh.crossings import too_small
 from ..mesh.given import as_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .findings import MOST_IDS, Certificate, Findings
+from .reach import not_positive
 
 __all__ = ["certify", "certify_file"]
 
 # Defects of the source that the exact tests here judge better than tolerances do.
 _JUDGED_EXACTLY = ("degenerate", "inverted", "inside_out")
+_SCALE = "scale the points"
 
 
 def certify(
@@ -121,7 +124,7 @@ def certify(
     else:
         surface, boundary_image = mesh, points
     # Of one mesh many maps are certified in turn.
-    _embedded(found, "source_embedded", surface.crossing_faces, "source surface")
+    _embedded(found, "source_embedded", surface.crossing_faces, surface.V, "source surface")
     proof = _boundary(found, boundary_image, surface.F, torus, tolerance)
     if isinstance(mesh, TetMesh):
         _volumes(found, points, mesh.T, boundary_image, surface.F)
@@ -189,16 +192,23 @@ def _positive(
     found: Findings, name: str, V: NDArray[np.float64], T: NDArray[np.int32], what: str
 ) -> None:
     bad = _core.certificate.not_positive_tets(V, T)
-    found.note(name, not len(bad), f"{what} volume not positive: {describe('tet', bad)}", bad)
+    reason = ""
+    if len(bad):
+        proven = not_positive(V, T, bad)
+        reason = f"{what} volume not positive: {describe('tet', proven)}"
+        if not len(proven):
+            reason = f"{what} volume too small for exact tests: {describe('tet', bad)}; {_SCALE}"
+        bad = np.concatenate([proven, np.setdiff1d(bad, proven)])
+    found.note(name, not len(bad), reason, bad)
 
 
-def _embedded(found: Findings, name: str, pairs: NDArray[np.int32], what: str) -> None:
-    found.note(
-        name,
-        not len(pairs),
-        f"the {what} touches or crosses itself: {describe('face pair', pairs)}",
-        pairs,
-    )
+def _embedded(
+    found: Findings, name: str, pairs: NDArray[np.int32], V: NDArray[np.float64], what: str
+) -> None:
+    fault = f"touches or crosses itself: {describe('face pair', pairs)}"
+    if too_small(V):
+        fault = f"is too small for exact tests; {_SCALE}"
+    found.note(name, not len(pairs), f"the {what} {fault}", pairs)
 
 
 def _boundary(
@@ -212,7 +222,7 @@ def _boundary(
 
     def not_crossing() -> str:
         pairs = _core.certificate.crossing_faces(image, F, MOST_IDS)
-        _embedded(found, "boundary_embedded", pairs, "boundary image")
+        _embedded(found, "boundary_embedded", pairs, image, "boundary image")
         return "the boundary image does not cross itself (exact tests)"
 
     if torus is None:

@@ -209,6 +209,33 @@ def test_one_inverted_tet(solid):
     assert "not positive" in certificate.reason
 
 
+@pytest.mark.parametrize("scale", [1e-102, 1e-150, 1e-300])
+def test_what_is_too_small_for_the_tests_is_said_to_be_that(scale):
+    ball = samples.ball(2)
+    for tiny in (certify(ball, ball.V * scale), certify(TetMesh(ball.V * scale, ball.T), ball.V)):
+        assert not tiny.certified
+        assert "volume too small for exact tests" in tiny.reason and "scale" in tiny.reason
+    surface = certify(ball.surface, ball.surface.V * scale)
+    assert surface.reason == ("the boundary image is too small for exact tests; scale the points")
+
+
+@pytest.mark.parametrize("scale", [1e-90, 1e-150])
+def test_tets_turned_over_are_named_before_those_that_are_too_small(scale):
+    ball = samples.ball(3)
+    inside = ball.boundary_index < 0
+    image = np.where(inside[:, None], scale * ball.V, ball.V)
+    assert "image volume too small for exact tests" in certify(ball, image).reason
+    tet = np.flatnonzero(inside[ball.T].sum(axis=1) == 1)[0]
+    corners = ball.T[tet]
+    image[corners[inside[corners]]] = 2.0 * ball.V[corners[~inside[corners]]].mean(axis=0)
+    found = certify(ball, image)
+    ids = found.ids["image_positive"]
+    signs = [ref.exact_orient3d(*image[ball.T[i]]) for i in ids]
+    n_turned = sum(sign < 0 for sign in signs)
+    assert tet in ids[:n_turned] and max(signs[:n_turned]) < 0 < min(signs[n_turned:])
+    assert found.reason.startswith(f"image volume not positive: {n_turned} tets")
+
+
 def test_flat_tet_is_refused(solid):
     tet = solid.T[100]
     image = solid.V.copy()
