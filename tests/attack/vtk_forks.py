@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import sys
+import tempfile
 import traceback
 from pathlib import Path
 from typing import NoReturn
 
+import stretchmap as sm
 from stretchmap.io import foreign
 
 
@@ -17,9 +20,21 @@ def read_in_forks() -> None:
     foreign.run_vtk = _forked  # type: ignore[assignment]
 
 
-def _forked(path: Path, out: Path) -> tuple[int, str]:
-    import pyvista  # noqa: F401  by the parent, once
+@functools.cache
+def _load() -> None:
+    """What is loaded only by reading, by the parent, once: else it is by every fork."""
+    import pyvista
 
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("sound.vtp", "sound.vtk"):
+            path = Path(folder, name)
+            sm.samples.torus_surface(8, 6).to_pyvista().save(path)
+            grid = pyvista.read(path).cast_to_unstructured_grid()
+            assert len(grid.celltypes) and len(grid.cell_connectivity) and len(grid.offset)
+
+
+def _forked(path: Path, out: Path) -> tuple[int, str]:
+    _load()
     said = out.with_name("said")
     pid = os.fork()
     if pid == 0:
