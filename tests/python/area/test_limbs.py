@@ -22,7 +22,7 @@ def limb(rings: int) -> sm.TriMesh:
     return with_limb(sm.samples.torus_surface(36, 18), rings, 0.12)
 
 
-@pytest.mark.parametrize(("rings", "time_limit"), [(30, 0.02), (60, 0.02), (130, 0.005)])
+@pytest.mark.parametrize(("rings", "time_limit"), [(30, 0.02), (130, 0.005)])
 def test_a_limb_is_mapped_without_a_fold(rings, time_limit):
     """The longest, which is spread in the flat chart, with as many more faces as a quarter of the
     time allows."""
@@ -144,7 +144,7 @@ def test_a_stretch_solve_that_breaks_down_ends_there(monkeypatch):
     assert result.certificate.certified
 
 
-@pytest.mark.parametrize(("n_tets", "rings"), [(1000, 22), (1000, 24), (4000, 20)])
+@pytest.mark.parametrize(("n_tets", "rings"), [(1000, 24), (4000, 20)])
 def test_areas_give_way_where_they_would_fold_faces(monkeypatch, n_tets, rings):
     """Three edges round a branch: between two of them, spread over the torus, all is cut off."""
     surface = with_branch(sm.samples.bumpy_torus(n_tets), rings, 0.5).surface

@@ -357,9 +357,8 @@ def test_a_chart_lost_in_rounding_is_passed_over(monkeypatch) -> None:
         sm.area_map(surface, keep_best=True)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_charts_are_eased_where_halving_takes_too_many_faces(seed: int) -> None:
-    surface = small_handle(seed, 3.3)
+def test_charts_are_eased_where_halving_takes_too_many_faces() -> None:
+    surface = small_handle(1, 3.3)
     assert start_of(surface).fitted(1.0) is None
     plain, eased = sm.area_map(surface, refine=False), sm.area_map(surface)
     assert eased.certificate.certified and eased.refinement is not None

@@ -191,9 +191,9 @@ def test_tetrahedralize_names_what_is_wrong_with_a_surface():
 
 def test_tetrahedralize_makes_as_many_tets_as_their_volume_asks_for():
     pytest.importorskip("tetgen")
-    surface = samples.torus_surface(30, 12)
-    volume = surface.volume / 8.3e5
-    solid = samples.tetrahedralize(surface, max_volume=volume)
+    surface = samples.torus_surface(90, 36)
+    volume = surface.volume / 4.5e5
+    solid = samples.tetrahedralize(surface, max_volume=volume, quality=10.0)
     assert solid.n_vertices > 110_000  # where tetgen ends if it is not told otherwise
     assert np.mean(solid.tet_volumes > volume) < 0.1  # those by the surface, which is not refined
     with pytest.raises(OptionError, match="GiB"):
