@@ -13,7 +13,8 @@ void bind(py::module_& m) {
             TetLocation found = self.locate(queries, signal_poll());
             return std::make_pair(std::move(found.tet), std::move(found.weights));
           },
-          py::arg("queries").noconvert(), release_gil());
+          py::arg("queries").noconvert(), release_gil())
+      .def("visits", &TetLocator::visits, py::arg("queries").noconvert(), release_gil());
 
   py::class_<SurfaceTree>(m, "SurfaceTree")
       .def(py::init<const PointsRef&, const FacesRef&>(), py::arg("points").noconvert(),
