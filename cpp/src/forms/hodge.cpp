@@ -1,7 +1,5 @@
 #include "stretchmap/forms/hodge.hpp"
 
-#include <vector>
-
 namespace stretchmap::forms {
 namespace {
 
@@ -45,16 +43,25 @@ HodgeProducts hodge_products(const mesh::SurfaceTopology& top, const PointsRef& 
                              const RowsRef& forms) {
   const Index k = static_cast<Index>(forms.rows());
   HodgeProducts products{Rows::Zero(k, k), Rows::Zero(k, k)};
-  std::vector<Eigen::Vector3d> vectors(k);
+  // Of all forms on a face: where the inner loop runs over forms, several go at once.
+  Eigen::Array<double, Eigen::Dynamic, 3> vectors(k, 3), stars(k, 3);
   for (Index f = 0; f < top.faces.rows(); ++f) {
     const FaceFrame frame = face_frame(top, points, f);
-    for (Index l = 0; l < k; ++l) vectors[l] = face_vector(top, frame, f, forms.row(l));
+    const Eigen::Vector3d& n = frame.normal;
     for (Index l = 0; l < k; ++l) {
-      for (Index m = 0; m < k; ++m) {
-        const Eigen::Vector3d star = frame.normal.cross(vectors[m]);
-        products.star(l, m) += vectors[l].cross(star).dot(frame.normal) * frame.area;
-        products.wedge(l, m) += vectors[l].cross(vectors[m]).dot(frame.normal) * frame.area;
-      }
+      const Eigen::Vector3d vector = face_vector(top, frame, f, forms.row(l));
+      vectors.row(l) = vector.transpose();
+      stars.row(l) = n.cross(vector).transpose();
+    }
+    for (Index l = 0; l < k; ++l) {
+      const double x = vectors(l, 0), y = vectors(l, 1), z = vectors(l, 2);
+      const auto volumes = [&](const auto& v) {
+        return ((y * v.col(2) - z * v.col(1)) * n[0] + (z * v.col(0) - x * v.col(2)) * n[1] +
+                (x * v.col(1) - y * v.col(0)) * n[2]) *
+               frame.area;
+      };
+      products.star.row(l).array() += volumes(stars).transpose();
+      products.wedge.row(l).array() += volumes(vectors).transpose();
     }
   }
   return products;

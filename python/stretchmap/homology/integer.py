@@ -1,6 +1,8 @@
-"""Exact integer linear algebra for matrices of a few rows, in Python integers."""
+"""Exact integer linear algebra for matrices of some hundred rows."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,20 +25,27 @@ def integer_kernel(matrix: ArrayLike) -> NDArray[np.int64]:
     matrix = np.asarray(matrix)
     k, n = matrix.shape
     # Columns of [matrix; identity], reduced by unimodular column operations.
-    free = [[int(x) for x in matrix[:, j]] + [int(i == j) for i in range(n)] for j in range(n)]
+    free = np.hstack([matrix.T, np.eye(n, dtype=np.int64)]).astype(np.int64)
     for row in range(k):
         while True:
-            active = [c for c in free if c[row]]
+            (active,) = np.nonzero(free[:, row])
             if len(active) < 2:
                 break
-            pivot = min(active, key=lambda c: abs(c[row]))
-            for c in active:
-                if c is not pivot:
-                    factor = c[row] // pivot[row]
-                    c[:] = [x - factor * y for x, y in zip(c, pivot, strict=True)]
-        free = [c for c in free if not c[row]]
-    basis = [c[k:] for c in free]
-    return np.array(basis, dtype=np.int64).reshape(len(basis), n)
+            pivot = active[np.argmin(np.abs(free[active, row]))]
+            active = active[active != pivot]
+            factors = free[active, row] // free[pivot, row]
+            free = _roomy(free, factors, free[pivot])
+            free[active] -= np.outer(factors, free[pivot])
+        free = free[free[:, row] == 0]
+    return free[:, k:].astype(np.int64)
+
+
+def _roomy(array: NDArray[Any], factors: NDArray[Any], row: NDArray[Any]) -> NDArray[Any]:
+    """The array, of Python integers where products of it might not fit into int64."""
+    if array.dtype == object:
+        return array
+    most = float(np.abs(factors).max()) * float(np.abs(row).max()) + float(np.abs(array).max())
+    return array if most < 2.0**62 else array.astype(object)
 
 
 def complement(vector: ArrayLike) -> NDArray[np.int64]:
@@ -94,12 +103,15 @@ def reduced_basis(rows: ArrayLike, metric: ArrayLike) -> NDArray[np.int64]:
     shorter = True
     while shorter:
         shorter = False
+        gram = basis @ metric @ basis.T
         for i in range(len(basis)):
             for j in range(len(basis)):
-                length = basis[j] @ metric @ basis[j]
-                share = (basis[i] @ metric @ basis[j]) / length
+                share = gram[i, j] / gram[j, j]
                 if i != j and abs(share) > 0.5 + 1e-9:
-                    basis[i] -= round(share) * basis[j]
+                    times = round(share)
+                    basis[i] -= times * basis[j]
+                    gram[i] -= times * gram[j]
+                    gram[:, i] -= times * gram[:, j]
                     shorter = True
     lengths = np.einsum("ij,jk,ik->i", basis, metric, basis)
     return basis[np.argsort(lengths, kind="stable")]
