@@ -7,8 +7,11 @@ namespace stretchmap::homology {
 
 CoverSearch::CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                          const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
-                         Poll poll, double limit)
-    : poll_(std::move(poll)), n_vertices_(top.n_vertices), best_(limit) {
+                         Poll poll, double limit, std::int64_t most_settled)
+    : poll_(std::move(poll)),
+      n_vertices_(top.n_vertices),
+      most_settled_(most_settled),
+      best_(limit) {
   const std::vector<Index> move = number_moves(forms);
   const Sheet there(target.data(), target.data() + target.size());
   forward_ = static_cast<Index>(moves_.size());
@@ -33,12 +36,12 @@ double CoverSearch::search_from(Index v, double cutoff) {
   queue_ = {};
   node(origin_, v) = {0.0, stamp_, -1, -1};
   queue_.push({0.0, origin_, v});
-  while (!queue_.empty()) {
+  while (!queue_.empty() && !is_exhausted()) {
     const auto [distance, sheet, i] = queue_.top();
     queue_.pop();
     if (2.0 * distance > limit_) break;
     if (distance > node(sheet, i).distance) continue;
-    if (poll_ && ++settled_ % 4096 == 0) poll_();
+    if (++settled_ % 4096 == 0 && poll_) poll_();
     settle(sheet, i, distance);
   }
   return limit_;

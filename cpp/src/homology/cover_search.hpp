@@ -1,6 +1,7 @@
 // Search of balls in the universal abelian cover of a surface.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <map>
@@ -21,13 +22,16 @@ class CoverSearch {
  public:
   CoverSearch(const mesh::SurfaceTopology& top, const VecRef& edge_length,
               const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target, Poll poll,
-              double limit = std::numeric_limits<double>::infinity());
+              double limit = std::numeric_limits<double>::infinity(),
+              std::int64_t most_settled = std::numeric_limits<std::int64_t>::max());
 
   // Looks for loops through vertex v shorter than `cutoff` and keeps the best of all searches.
   // Returns the length of the shortest through v, or the cutoff if that is less.
   double search_from(Index v, double cutoff);
 
   double best() const { return best_; }
+  // Nodes were settled as often as they may be: the last search was not finished.
+  bool is_exhausted() const { return settled_ >= most_settled_; }
   const Loop& loop() const { return loop_; }
 
  private:
@@ -68,7 +72,8 @@ class CoverSearch {
   std::vector<std::vector<std::unique_ptr<Node[]>>> pages_;
   std::vector<std::vector<Index>> next_;  // (sheet, move) -> sheet, -1 where not yet known
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue_;
-  Index origin_ = 0, stamp_ = 0, settled_ = 0;
+  Index origin_ = 0, stamp_ = 0;
+  std::int64_t settled_ = 0, most_settled_;
   double best_;
   double limit_ = 0.0;  // shortest loop through the current source so far, or its cutoff
   Loop loop_;

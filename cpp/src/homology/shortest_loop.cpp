@@ -36,7 +36,7 @@ Loop shortest_through(const mesh::SurfaceTopology& top, const VecRef& edge_lengt
 
   Vec bound = Vec::Zero(n);  // no loop of the class through crossing[k] is shorter
   Index source = 0;
-  while (bound.minCoeff(&source) < search.best()) {
+  while (!search.is_exhausted() && bound.minCoeff(&source) < search.best()) {
     const double length = search.search_from(crossing[source], 1.25 * search.best());
     for (Index k = 0; k < n; ++k) {
       const double apart = std::abs(arc[k] - arc[source]);
@@ -51,8 +51,9 @@ Loop shortest_through(const mesh::SurfaceTopology& top, const VecRef& edge_lengt
 
 Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                    const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
-                   const Loop& crossing, const Poll& poll, double limit) {
-  CoverSearch search(top, edge_length, forms, target, poll, limit);
+                   const Loop& crossing, const Poll& poll, double limit,
+                   std::int64_t most_settled) {
+  CoverSearch search(top, edge_length, forms, target, poll, limit, most_settled);
   const bool bounded = limit < std::numeric_limits<double>::infinity();
   Loop loop;
   if (forms.rows() == 2 && !bounded) {
@@ -65,6 +66,7 @@ Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
     }
   }
   if (loop.empty()) loop = shortest_through(top, edge_length, crossing, search);
+  if (search.is_exhausted()) return {};
   if (loop.empty() && bounded) return loop;
   if (loop.empty()) {
     throw Error("SolverError", "no loop of the class crosses the loop given");

@@ -21,6 +21,7 @@ from ..base.tables import HasSummary, table
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms
 from .integer import integer_inverse
+from .shortest_basis import Generated, short_loops, shortest_walk
 from .walks import save_loops, shortest_in_class
 
 if TYPE_CHECKING:
@@ -114,12 +115,20 @@ class HomologyBasis(HasSummary):
 
     @cached_property
     def handle_loops(self) -> tuple[NDArray[np.int32], ...]:
-        """Shortest loop of edges in each handle class: g loops that bound inside."""
-        return tuple(self.shortest_loop(c) for c in self.handle_classes)
+        """g short loops of edges that bound inside.
+
+        Their classes are a basis over the integers of all that bound inside: those of
+        `handle_classes`, some of them exchanged for shorter ones. Each loop is the shortest of its
+        class, and is no longer than that of the handle class it stands for; whether another basis
+        is shorter in sum is not proven. One exception: where the shortest cycle of a class is in
+        pieces of which none can stand for it, the loop joins these, and may be longer than the
+        shortest if the genus is large.
+        """
+        return self._short_loops(self.handle_classes, ())
 
     @cached_property
     def tunnel_loops(self) -> tuple[NDArray[np.int32], ...]:
-        """Shortest loop of edges in each tunnel class: g loops that bound outside.
+        """g loops of edges that bound outside, as `handle_loops` from `tunnel_classes`.
 
         Raises
         ------
@@ -130,7 +139,7 @@ class HomologyBasis(HasSummary):
             raise SelfIntersectionError(
                 "the surface crosses itself: which loops bound outside it is not defined"
             )
-        return tuple(self._shortest_loop(c, self.handle_loops) for c in self.tunnel_classes)
+        return self._short_loops(self.tunnel_classes, self.handle_loops)
 
     @property
     def meridian(self) -> NDArray[np.int32]:
@@ -165,7 +174,8 @@ class HomologyBasis(HasSummary):
         ----------
         coefficients : (2g,) array_like of int
             The class over ``generators``, not zero; none beyond 100 either way, since the loop goes
-            round that often and the time to find it grows faster still.
+            round that often and the time to find it grows faster still. It grows exponentially with
+            the genus, too, if the shortest cycle of the class is in several pieces.
 
         Returns
         -------
@@ -184,6 +194,8 @@ class HomologyBasis(HasSummary):
         target = as_integers(coefficients, "coefficients", shape, -_MOST_TURNS, _MOST_TURNS)
         if not target.any():
             raise ArrayError(f"a class is {2 * self.genus} integers, not all zero")
+        if self.genus > 1:
+            return shortest_walk(self._generated(), target)
         return self._shortest_loop(target, ())
 
     def loop_below(self, coefficients: NDArray[np.int64], limit: float) -> NDArray[np.int32] | None:
@@ -202,6 +214,16 @@ class HomologyBasis(HasSummary):
         """
         loop = self._shortest_loop(np.asarray(coefficients), (), limit)
         return loop if len(loop) else None
+
+    def _short_loops(
+        self, rows: NDArray[np.int64], known: tuple[NDArray[np.int32], ...]
+    ) -> tuple[NDArray[np.int32], ...]:
+        if self.genus > 1:
+            return short_loops(self._generated(), rows)
+        return tuple(self._shortest_loop(row, known) for row in rows)
+
+    def _generated(self) -> Generated:
+        return Generated(self.surface, self.generators, self.dual_forms, self.intersection)
 
     def _shortest_loop(
         self,

@@ -1,6 +1,7 @@
 // Shortest loop of edges in a homology class.
 #pragma once
 
+#include <cstdint>
 #include <limits>
 
 #include "stretchmap/base/types.hpp"
@@ -29,10 +30,13 @@ namespace stretchmap::homology {
 // \param target      (k) not zero
 // \param limit       only a shorter loop is looked for; where there is none, the answer is empty
 // \param crossing    a loop with non-zero intersection number with the class
+// \param most_settled nodes of the cover, whose number can grow exponentially with the genus; the
+//                    answer is empty where more would have to be settled, too
 // \throws Error "SolverError" when no loop of the class passes through `crossing`.
 Loop shortest_loop(const mesh::SurfaceTopology& top, const VecRef& edge_length,
                    const Eigen::Ref<const IndexRows>& forms, const IndexVecRef& target,
                    const Loop& crossing, const Poll& poll = {},
-                   double limit = std::numeric_limits<double>::infinity());
+                   double limit = std::numeric_limits<double>::infinity(),
+                   std::int64_t most_settled = std::numeric_limits<std::int64_t>::max());
 
 }  // namespace stretchmap::homology
