@@ -21,7 +21,7 @@ from ..base.tables import HasSummary, table
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms
 from .integer import integer_inverse
-from .shortest_basis import Generated, short_loops, shortest_walk
+from .shortest_basis import Generated, short_loops, shortest_walk, walk_below
 from .walks import save_loops, shortest_in_class
 
 if TYPE_CHECKING:
@@ -212,7 +212,11 @@ class HomologyBasis(HasSummary):
         -------
         (k,) ndarray of int32, or None
         """
-        loop = self._shortest_loop(np.asarray(coefficients), (), limit)
+        target = np.asarray(coefficients)
+        if self.genus > 1:
+            loop = walk_below(self._generated(), target, limit)
+        else:
+            loop = self._shortest_loop(target, (), limit)
         return loop if len(loop) else None
 
     def _short_loops(

@@ -16,7 +16,7 @@ from .walks import joined_loops, shortest_cycles, shortest_in_class
 if TYPE_CHECKING:
     from ..mesh.meshes import TriMesh
 
-__all__ = ["Generated", "ShortestBasis", "short_loops", "shortest_walk"]
+__all__ = ["Generated", "ShortestBasis", "short_loops", "shortest_walk", "walk_below"]
 
 _ROOTS = 4  # vertices of a loop from which others are looked for
 _CANDIDATES = 20  # loops to be exchanged, per member of a basis
@@ -82,6 +82,22 @@ def shortest_walk(basis: Generated, row: NDArray[np.int64]) -> NDArray[np.int32]
     return loop if len(loop) else _walk(basis, row, _cycles(basis, row), 2**62)
 
 
+def walk_below(basis: Generated, row: NDArray[np.int64], limit: float) -> NDArray[np.int32]:
+    """The shortest loop of a class, none if it is not shorter than a limit."""
+    if _is_fine(basis):
+        return _searched(basis, row, limit, 2**62)
+    cycles = _cycles(basis, row)
+    if not sum(basis.length(cycle) for cycle in cycles) < limit:
+        return _NONE
+    loop = _walk(basis, row, cycles, _MOST_SETTLED // basis.genus**2)
+    return loop if basis.length(loop) < limit else _NONE
+
+
+def _is_fine(basis: Generated) -> bool:
+    """Whether balls of the cover may well take less time than minimum cuts of the surface."""
+    return basis.surface.n_faces > (3 * basis.genus) ** 2
+
+
 def _find(basis: Generated, found: ShortestBasis, k: int) -> None:
     """The shortest loop of member k, or shorter ones in its place."""
     row = found.rows[k]
@@ -101,14 +117,11 @@ def _cycles(basis: Generated, row: NDArray[np.int64]) -> list[NDArray[np.int32]]
 
 
 def _searched_nearby(basis: Generated, row: NDArray[np.int64]) -> NDArray[np.int32]:
-    """The shortest loop of a class if it is found at once, as on fine surfaces of small genus.
-
-    There balls of the cover take less time than minimum cuts of the surface.
-    """
-    width = math.isqrt(basis.surface.n_faces)
-    if width <= 3 * basis.genus:
+    """The shortest loop of a class if it is found at once, as on fine surfaces of small genus."""
+    if not _is_fine(basis):
         return _NONE
-    return _searched(basis, row, math.inf, width**3 // (3 * basis.genus))
+    most = int(basis.surface.n_faces**1.5 / (3 * basis.genus))
+    return _searched(basis, row, math.inf, most)
 
 
 def _walk(

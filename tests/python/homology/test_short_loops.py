@@ -62,6 +62,8 @@ def test_loops_of_many_bars_and_holes(solid, genus, length):
     # Also in classes that many loops together make up.
     target = basis.classes(basis.handle_loops[0])
     assert basis.length(basis.shortest_loop(target)) == pytest.approx(length)
+    assert basis.length(basis.loop_below(target, 50.0)) == pytest.approx(length)
+    assert basis.loop_below(target, length) is None
 
 
 @pytest.mark.parametrize("solid", [plate(1, 3), plate(2, 3), frames(1)], ids=["3", "6", "frames"])
