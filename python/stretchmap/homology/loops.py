@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 __all__ = ["HomologyBasis"]
 
 _MOST_TURNS = 100  # the search for a shortest loop walks round as often as the class says
+# Nodes of the cover, at most, for a loop of a class, by the square of the genus: more than
+# surfaces of small genus take.
+_MOST_SETTLED, _SETTLED_A_FACE = 20_000_000, 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,20 +118,22 @@ class HomologyBasis(HasSummary):
 
     @cached_property
     def handle_loops(self) -> tuple[NDArray[np.int32], ...]:
-        """g short loops of edges that bound inside.
+        """Shortest loop of edges in each handle class: g loops that bound inside.
 
-        Their classes are a basis over the integers of all that bound inside: those of
-        `handle_classes`, some of them exchanged for shorter ones. Each loop is the shortest of its
-        class, and is no longer than that of the handle class it stands for; whether another basis
-        is shorter in sum is not proven. One exception: where the shortest cycle of a class is in
-        pieces of which none can stand for it, the loop joins these, and may be longer than the
-        shortest if the genus is large.
+        Where the genus is too large for the mesh to search for these, 16 for some hundred faces,
+        they are short loops in a basis over the integers of what bounds inside: that of
+        `handle_classes` with some of them exchanged for shorter ones, see `classes`. Then each is
+        the shortest of its class and no longer than that of the class it stands for, with one
+        exception: where the shortest cycle of a class is in pieces of which none can stand for it,
+        the loop joins these, and may be longer than the shortest.
         """
         return self._short_loops(self.handle_classes, ())
 
     @cached_property
     def tunnel_loops(self) -> tuple[NDArray[np.int32], ...]:
-        """g loops of edges that bound outside, as `handle_loops` from `tunnel_classes`.
+        """Shortest loop of edges in each tunnel class: g loops that bound outside.
+
+        Where the genus is large for the mesh, in a basis of these, as for `handle_loops`.
 
         Raises
         ------
@@ -222,9 +227,15 @@ class HomologyBasis(HasSummary):
     def _short_loops(
         self, rows: NDArray[np.int64], known: tuple[NDArray[np.int32], ...]
     ) -> tuple[NDArray[np.int32], ...]:
-        if self.genus > 1:
-            return short_loops(self._generated(), rows)
-        return tuple(self._shortest_loop(row, known) for row in rows)
+        most = max(_MOST_SETTLED, _SETTLED_A_FACE * self.surface.n_faces)
+        most //= max(self.genus, 1) ** 2
+        loops = []
+        for row in rows:
+            loop = self._shortest_loop(row, known, most=most if self.genus > 1 else None)
+            if not len(loop):
+                return short_loops(self._generated(), rows)
+            loops.append(loop)
+        return tuple(loops)
 
     def _generated(self) -> Generated:
         return Generated(self.surface, self.generators, self.dual_forms, self.intersection)
@@ -234,13 +245,14 @@ class HomologyBasis(HasSummary):
         target: NDArray[np.int64],
         known: tuple[NDArray[np.int32], ...],
         limit: float = math.inf,
+        most: int | None = None,
     ) -> NDArray[np.int32]:
         crossing = [
             loop.tolist()
             for loop in (*known, *self.generators)
             if self.classes(loop) @ self.intersection @ target
         ]
-        return shortest_in_class(self.surface, self.dual_forms, target, crossing, limit)
+        return shortest_in_class(self.surface, self.dual_forms, target, crossing, limit, most)
 
     def length(self, loop: ArrayLike) -> float:
         """Length of a closed polygon through vertices of the surface, in units of ``V``.

@@ -79,13 +79,13 @@ def shortest_walk(basis: Generated, row: NDArray[np.int64]) -> NDArray[np.int32]
     Time grows exponentially with the genus only where the shortest cycle of the class is in pieces.
     """
     loop = _searched_nearby(basis, row)
-    return loop if len(loop) else _walk(basis, row, _cycles(basis, row), 2**62)
+    return loop if len(loop) else _walk(basis, row, _cycles(basis, row), None)
 
 
 def walk_below(basis: Generated, row: NDArray[np.int64], limit: float) -> NDArray[np.int32]:
     """The shortest loop of a class, none if it is not shorter than a limit."""
     if _is_fine(basis):
-        return _searched(basis, row, limit, 2**62)
+        return _searched(basis, row, limit, None)
     cycles = _cycles(basis, row)
     if not sum(basis.length(cycle) for cycle in cycles) < limit:
         return _NONE
@@ -125,7 +125,7 @@ def _searched_nearby(basis: Generated, row: NDArray[np.int64]) -> NDArray[np.int
 
 
 def _walk(
-    basis: Generated, row: NDArray[np.int64], cycles: list[NDArray[np.int32]], most: int
+    basis: Generated, row: NDArray[np.int64], cycles: list[NDArray[np.int32]], most: int | None
 ) -> NDArray[np.int32]:
     """One loop of the class of some shortest cycles: the shortest, if it is found in time."""
     joined = joined_loops(basis.surface, cycles)
@@ -137,7 +137,7 @@ def _walk(
 
 
 def _searched(
-    basis: Generated, row: NDArray[np.int64], limit: float, most: int
+    basis: Generated, row: NDArray[np.int64], limit: float, most: int | None
 ) -> NDArray[np.int32]:
     crossing = [basis.generators[i].tolist() for i in np.flatnonzero(basis.intersection @ row)]
     return shortest_in_class(basis.surface, basis.dual_forms, row, crossing, limit, most)

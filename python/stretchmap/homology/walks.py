@@ -27,7 +27,7 @@ def shortest_in_class(
     target: NDArray[np.int64],
     crossing: list[list[int]],
     limit: float,
-    most_settled: int = 2**62,
+    most_settled: int | None = None,
 ) -> NDArray[np.int32]:
     """Vertices of the shortest loop of a class, none if it is not shorter than the limit.
 
@@ -38,8 +38,9 @@ def shortest_in_class(
     top = surface.topology
     lengths = _core.mesh.edge_lengths(top, surface.V)
     loop = _core.homology.shortest_loop(
-        top, lengths, forms, target.astype(np.int32), min(crossing, key=len), limit, most_settled
-    )
+        top, lengths, forms, target.astype(np.int32), min(crossing, key=len), limit,
+        2**62 if most_settled is None else most_settled,
+    )  # fmt: skip
     return read_only(np.array(loop, dtype=np.int32))
 
 

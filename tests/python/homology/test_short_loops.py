@@ -66,6 +66,18 @@ def test_loops_of_many_bars_and_holes(solid, genus, length):
     assert basis.loop_below(target, length) is None
 
 
+@pytest.mark.parametrize("solid", [plate(1, 2), plate(3, 3), frames(1)], ids=["2", "9", "frames"])
+def test_loops_of_small_genus_are_those_of_their_classes(solid):
+    basis = homology_basis(solid.surface, solid)
+    for loops, rows in (
+        (basis.handle_loops, basis.handle_classes),
+        (basis.tunnel_loops, basis.tunnel_classes),
+    ):
+        assert np.array_equal([basis.classes(loop) for loop in loops], rows)
+    pairing = basis.tunnel_classes @ basis.intersection @ basis.handle_classes.T
+    assert np.array_equal(pairing, np.eye(basis.genus, dtype=int))
+
+
 @pytest.mark.parametrize("solid", [plate(1, 3), plate(2, 3), frames(1)], ids=["3", "6", "frames"])
 def test_loops_are_no_longer_than_those_of_the_classes_of_the_basis(solid):
     solid = shaken(solid)
