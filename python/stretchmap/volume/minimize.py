@@ -35,6 +35,7 @@ _ROUGHLY = 2.0
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
+_CONVEX = 8  # Hessians without them once a step was short: elements near folding need all they have
 # Of the logarithms of uneven volumes: what is left after a step of full length, and the mean at
 # which even ones are asked for.
 _LEANER, _EVEN = 0.7, 0.1
@@ -70,15 +71,21 @@ class Minimized:
 class _Sharing:
     """At the last weight the Hessian changes little: a few steps share one, as long as it serves.
 
-    Whether to stop is for a renewed one to say.
+    Whether to stop is for a renewed one to say. Negative eigenvalues are left out of the next ones
+    where a step is cut short: round elements close to folding they promise what lies far beyond.
     """
 
     shared: int
     kept: int = 0
     rest: int = 0
+    convex: int = 0
 
     def update(self, alpha: float, small: bool) -> None:
         """After a step of length ``alpha`` at the last weight."""
+        if alpha < _SERVED:
+            self.convex = _CONVEX
+        elif not self.kept:
+            self.convex = max(self.convex - 1, 0)
         if self.kept and alpha < _SERVED:
             self.rest = _REST
         elif not self.kept:
@@ -215,7 +222,7 @@ def minimize(
             tol=o.cg_tol if weight >= goal else _ROUGHLY * o.cg_tol,
             max_cg=o.max_cg,
             keep_hessian=sharing.kept > 0,
-            negative=_NEGATIVE if weight >= o.volume_weight else 0.0,
+            negative=_NEGATIVE if weight >= o.volume_weight and not sharing.convex else 0.0,
         )
         if free != (1.0, 1.0):
             ratios = _core.mesh.tet_volumes(x, model.T) / _core.mesh.tet_volumes(model.V, model.T)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from stretchmap import _core
 from stretchmap.samples.solids import cut_cells
 from stretchmap.volume import engine
 from stretchmap.volume import minimize as minimizing
@@ -67,6 +68,29 @@ def steps_until_rest(given):
     done = minimize(model, np.zeros((4, 3)), history, glide=False, start=goal, goal=goal)
     assert done.converged
     return len(kept)
+
+
+def test_steps_cut_short_at_the_last_weight_are_followed_by_convex_hessians(monkeypatch):
+    made, options = [], _core.volume.NewtonOptions
+    monkeypatch.setattr(
+        _core.volume, "NewtonOptions", lambda **given: made.append(given) or options(**given)
+    )
+    report = SimpleNamespace(energy=1.0, flips=0, folds=0, min_det=1.0, min_facing=1.0)
+    gaining = [
+        SimpleNamespace(
+            before=report, after=SimpleNamespace(energy=0.9), alpha=alpha, decrement=0.2,
+            negative_curvature=False, held_up=None,
+        )
+        for alpha in [1.0, 0.3, *[1.0] * 30]
+    ]  # fmt: skip
+    steps_until_rest(itertools.chain(gaining, steps(*[(1.0, 1e-9)] * 30)))
+    kept = [given["keep_hessian"] for given in made]
+    shares = [given["negative"] for given in made]
+    assert shares[0] == shares[1] > 0.0 and shares[2] == 0.0
+    again = shares.index(shares[0], 2)
+    # So many with a Hessian of their own; those that share one have what it has.
+    assert kept[2:again].count(False) == minimizing._CONVEX
+    assert max(shares[2:again]) == 0.0
 
 
 def asked_of(volumes, alphas):
@@ -180,7 +204,7 @@ def test_fewer_steps_lead_to_nearly_the_same_volumes(monkeypatch):
         assert found.converged and found.certificate.certified
         return len(found.history), found.distortion.element_std
 
-    smooth, flat = sm.samples.vertebra_like(16_000, seed=1), plate(6, 8, 2)
+    smooth, flat = sm.samples.vertebra_like(16_000, seed=3), plate(8, 8, 2)
     steps, error = steps_and_error(smooth)
     on_plate = steps_and_error(flat)
     monkeypatch.setattr(minimizing, "_SLOWLY", 0.0)
