@@ -35,7 +35,7 @@ _ROUGHLY = 2.0
 _REST = 1  # steps with a Hessian each after one was too old
 # Of the elements' negative eigenvalues at the last weight, where pressures are nearly balanced.
 _NEGATIVE = 0.5
-_CONVEX = 8  # Hessians without them once a step was short: elements near folding need all they have
+_CONVEX = 3  # Hessians without them once a step was short: elements near folding need all they have
 # Of the logarithms of uneven volumes: what is left after a step of full length, and the mean at
 # which even ones are asked for.
 _LEANER, _EVEN = 0.7, 0.1
