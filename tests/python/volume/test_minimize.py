@@ -204,7 +204,7 @@ def test_fewer_steps_lead_to_nearly_the_same_volumes(monkeypatch):
         assert found.converged and found.certificate.certified
         return len(found.history), found.distortion.element_std
 
-    smooth, flat = sm.samples.vertebra_like(16_000, seed=3), plate(8, 8, 2)
+    smooth, flat = sm.samples.vertebra_like(16_000, seed=1), plate(6, 8, 2)
     steps, error = steps_and_error(smooth)
     on_plate = steps_and_error(flat)
     monkeypatch.setattr(minimizing, "_SLOWLY", 0.0)
