@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import scipy.stats
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import as_reals, read_only
@@ -198,6 +197,8 @@ def field_statistics(
     >>> statistics.t.shape == (found.mean.n_tets,)
     True
     """
+    import scipy.stats  # takes as long as all else that fitting a population imports
+
     if not hasattr(scipy.stats, "false_discovery_control"):
         raise MissingDependencyError("field statistics need SciPy 1.11: pip install 'scipy>=1.11'")
     against = real("against", against)

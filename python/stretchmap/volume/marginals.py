@@ -16,13 +16,16 @@ few tenths of a per cent. Two means against that:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from .. import _core
 from ..base.torus import TWO_PI, Torus
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 __all__ = ["Marginals"]
 
@@ -182,6 +185,8 @@ class Marginals:
         self, x: NDArray[np.float64], values: NDArray[np.float64], period: float
     ) -> PchipInterpolator:
         """`_below` as a function of the level."""
+        from scipy.interpolate import PchipInterpolator  # a quarter of what starting takes
+
         source, image = self._histograms(self._amounts(x), values, period)
         below = self._below(source, image, period)
         step = period / (len(below) - 1)
