@@ -13,8 +13,8 @@ namespace stretchmap::maps {
 namespace {
 
 constexpr Index kBatch = 65536;  // queries between two polls
-constexpr Index kLeaf = 6;       // tets that are not halved any further
-constexpr int kDeepest = 64;     // boxes that wait; halves of fewer than 2^32 tets
+constexpr Index kLeafTets = 6;   // tets that are not halved any further
+constexpr int kDeepestBox = 64;  // boxes that wait; halves of fewer than 2^32 tets
 // Turning a point, at most about one from the origin, rounds it by less.
 constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();
 // Tets as long as wide to this share keep the axes of the box they are in.
@@ -64,7 +64,7 @@ void TetLocator::grow(Index begin, Index end, const Eigen::Matrix3d& axes, Halvi
   box.end = end;
   measure(box, halving);
   boxes_.push_back(box);
-  if (end - begin <= kLeaf) return;
+  if (end - begin <= kLeafTets) return;
   const Index middle = begin + (end - begin) / 2;
   const auto tet = [&](Index place) { return order_.begin() + place; };
   std::nth_element(tet(begin), tet(middle), tet(end), [&](Index s, Index t) {
@@ -145,7 +145,7 @@ void TetLocator::examine(const Eigen::Vector3d& p, Index t, Best& best) const {
 TetLocator::Best TetLocator::find(const Eigen::Vector3d& p) const {
   Best best;
   const Eigen::Vector3d at = unit(p);
-  Index open[kDeepest];
+  Index open[kDeepestBox];
   int n_open = 0;
   if (!boxes_.empty()) open[n_open++] = 0;
   while (n_open > 0) {
