@@ -5,8 +5,11 @@
 namespace stretchmap::maps {
 void bind(py::module_& m) {
   py::class_<TetLocator>(m, "TetLocator")
-      .def(py::init<const PointsRef&, const TetsRef&, double>(), py::arg("points").noconvert(),
-           py::arg("tets").noconvert(), py::arg("tolerance"), release_gil())
+      .def(py::init([](const PointsRef& points, const TetsRef& tets, double tolerance) {
+             return TetLocator(points, tets, tolerance, signal_poll());
+           }),
+           py::arg("points").noconvert(), py::arg("tets").noconvert(), py::arg("tolerance"),
+           release_gil())
       .def(
           "locate",
           [](const TetLocator& self, const PointsRef& queries) {

@@ -12,9 +12,10 @@
 namespace stretchmap::maps {
 namespace {
 
-constexpr Index kBatch = 65536;  // queries between two polls
-constexpr Index kLeafTets = 6;   // tets that are not halved any further
-constexpr int kDeepestBox = 64;  // boxes that wait; halves of fewer than 2^32 tets
+constexpr Index kBatch = 65536;      // queries between two polls
+constexpr std::size_t kBoxes = 256;  // likewise, small ones
+constexpr Index kLeafTets = 6;       // tets that are not halved any further
+constexpr int kDeepestBox = 64;      // boxes that wait; halves of fewer than 2^32 tets
 // Turning a point, at most about one from the origin, rounds it by less.
 constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();
 // Tets as long as wide to this share keep the axes of the box they are in.
@@ -38,7 +39,8 @@ struct TetLocator::Halving {
   int axis = 0;
 };
 
-TetLocator::TetLocator(const PointsRef& points, const TetsRef& tets, double tolerance)
+TetLocator::TetLocator(const PointsRef& points, const TetsRef& tets, double tolerance,
+                       const Poll& poll)
     : points_(points), tets_(tets), tolerance_(tolerance), order_(tets.rows()) {
   const Index k = static_cast<Index>(tets_.rows());
   if (k == 0) return;
@@ -53,11 +55,13 @@ TetLocator::TetLocator(const PointsRef& points, const TetsRef& tets, double tole
   });
   std::iota(order_.begin(), order_.end(), 0);
   boxes_.reserve(static_cast<std::size_t>(k) / 2);
-  grow(0, k, Eigen::Matrix3d::Identity(), halving);
+  grow(0, k, Eigen::Matrix3d::Identity(), halving, poll);
 }
 
-void TetLocator::grow(Index begin, Index end, const Eigen::Matrix3d& axes, Halving& halving) {
+void TetLocator::grow(Index begin, Index end, const Eigen::Matrix3d& axes, Halving& halving,
+                      const Poll& poll) {
   const std::size_t id = boxes_.size();
+  if (poll && (id % kBoxes == 0 || end - begin > kBatch)) poll();
   Box box;
   box.axes = axes;
   box.begin = begin;
@@ -70,9 +74,9 @@ void TetLocator::grow(Index begin, Index end, const Eigen::Matrix3d& axes, Halvi
   std::nth_element(tet(begin), tet(middle), tet(end), [&](Index s, Index t) {
     return std::pair(halving.key[s], s) < std::pair(halving.key[t], t);
   });
-  grow(begin, middle, box.axes, halving);
+  grow(begin, middle, box.axes, halving, poll);
   boxes_[id].second = static_cast<Index>(boxes_.size());
-  grow(middle, end, box.axes, halving);
+  grow(middle, end, box.axes, halving, poll);
 }
 
 // Axes and size of a box, and where it is cut: along the axis with most tets one after the other.

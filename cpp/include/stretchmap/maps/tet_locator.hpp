@@ -19,7 +19,7 @@ class TetLocator {
   // \param points,tets (n, 3) and (k, 4), copied. Tets without positive volume are never answered.
   // \param tolerance >= 0: a point no farther outside a tet counts as in it, with weights that are
   //        then slightly negative: they still reproduce the point.
-  TetLocator(const PointsRef& points, const TetsRef& tets, double tolerance);
+  TetLocator(const PointsRef& points, const TetsRef& tets, double tolerance, const Poll& poll = {});
 
   // \param queries (n, 3)
   // \return the first of the tets that hold a point, else the one whose faces it violates least.
@@ -40,7 +40,8 @@ class TetLocator {
   struct Halving;
 
   Eigen::Vector3d unit(const Eigen::Vector3d& p) const { return (p - center_) * scale_; }
-  void grow(Index begin, Index end, const Eigen::Matrix3d& axes, Halving& halving);
+  void grow(Index begin, Index end, const Eigen::Matrix3d& axes, Halving& halving,
+            const Poll& poll);
   void measure(Box& box, Halving& halving) const;
   void examine(const Eigen::Vector3d& p, Index t, Best& best) const;
   Best find(const Eigen::Vector3d& p) const;
