@@ -6,37 +6,30 @@ Which is which is a matter of linking numbers, or of the solid when it is given,
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import _core
 from ..base.arrays import as_integers, read_only
 from ..base.tables import HasSummary, table
 from ..errors import ArrayError, GenusError, SelfIntersectionError
 from ..forms.harmonic import HarmonicForms
+from .generators import Generators
 from .integer import integer_inverse
-from .shortest_basis import Generated, short_loops, shortest_walk, walk_below
-from .walks import save_loops, shortest_in_class
-
-if TYPE_CHECKING:
-    from ..mesh.meshes import TriMesh
+from .shortest_basis import searched, short_loops, shortest_walk, walk_below
+from .walks import save_loops
 
 __all__ = ["HomologyBasis"]
 
 _MOST_TURNS = 100  # the search for a shortest loop walks round as often as the class says
-# Nodes of the cover, at most, for a loop of a class, by the square of the genus: more than
-# surfaces of small genus take.
-_MOST_SETTLED, _SETTLED_A_FACE = 20_000_000, 200
 
 
 @dataclass(frozen=True, eq=False)
-class HomologyBasis(HasSummary):
+class HomologyBasis(Generators, HasSummary):
     """Generators of the first homology of a closed surface and what the embedding says of them.
 
     A loop is an array of vertex ids, the first not repeated at the end. A class is an integer row
@@ -73,11 +66,6 @@ class HomologyBasis(HasSummary):
     True
     """
 
-    surface: TriMesh = field(repr=False)
-    genus: int
-    generators: tuple[NDArray[np.int32], ...] = field(repr=False)
-    dual_forms: NDArray[np.int32] = field(repr=False)
-    intersection: NDArray[np.int64]
     linking: NDArray[np.int64] | None
     handle_classes: NDArray[np.int64]
     tunnel_classes: NDArray[np.int64] | None
@@ -127,7 +115,7 @@ class HomologyBasis(HasSummary):
         exception: where the shortest cycle of a class is in pieces of which none can stand for it,
         the loop joins these, and may be longer than the shortest.
         """
-        return self._short_loops(self.handle_classes, ())
+        return short_loops(self, self.handle_classes, ())
 
     @cached_property
     def tunnel_loops(self) -> tuple[NDArray[np.int32], ...]:
@@ -144,7 +132,7 @@ class HomologyBasis(HasSummary):
             raise SelfIntersectionError(
                 "the surface crosses itself: which loops bound outside it is not defined"
             )
-        return self._short_loops(self.tunnel_classes, self.handle_loops)
+        return short_loops(self, self.tunnel_classes, self.handle_loops)
 
     @property
     def meridian(self) -> NDArray[np.int32]:
@@ -170,7 +158,7 @@ class HomologyBasis(HasSummary):
         tunnel = self.tunnel_classes
         if tunnel is not None and np.array_equal(self.torus_classes[:1], tunnel):
             return self.tunnel_loops[0]
-        return self._shortest_loop(self.torus_classes[0], self.handle_loops)
+        return searched(self, self.torus_classes[0], self.handle_loops)
 
     def shortest_loop(self, coefficients: ArrayLike) -> NDArray[np.int32]:
         """Shortest loop of edges in a homology class.
@@ -199,9 +187,7 @@ class HomologyBasis(HasSummary):
         target = as_integers(coefficients, "coefficients", shape, -_MOST_TURNS, _MOST_TURNS)
         if not target.any():
             raise ArrayError(f"a class is {2 * self.genus} integers, not all zero")
-        if self.genus > 1:
-            return shortest_walk(self._generated(), target)
-        return self._shortest_loop(target, ())
+        return shortest_walk(self, target)
 
     def loop_below(self, coefficients: NDArray[np.int64], limit: float) -> NDArray[np.int32] | None:
         """Shortest loop of a class if it is shorter than a limit; quick where the limit is small.
@@ -217,69 +203,7 @@ class HomologyBasis(HasSummary):
         -------
         (k,) ndarray of int32, or None
         """
-        target = np.asarray(coefficients)
-        if self.genus > 1:
-            loop = walk_below(self._generated(), target, limit)
-        else:
-            loop = self._shortest_loop(target, (), limit)
-        return loop if len(loop) else None
-
-    def _short_loops(
-        self, rows: NDArray[np.int64], known: tuple[NDArray[np.int32], ...]
-    ) -> tuple[NDArray[np.int32], ...]:
-        most = max(_MOST_SETTLED, _SETTLED_A_FACE * self.surface.n_faces)
-        most //= max(self.genus, 1) ** 2
-        loops = []
-        for row in rows:
-            loop = self._shortest_loop(row, known, most=most if self.genus > 1 else None)
-            if not len(loop):
-                return short_loops(self._generated(), rows)
-            loops.append(loop)
-        return tuple(loops)
-
-    def _generated(self) -> Generated:
-        return Generated(self.surface, self.generators, self.dual_forms, self.intersection)
-
-    def _shortest_loop(
-        self,
-        target: NDArray[np.int64],
-        known: tuple[NDArray[np.int32], ...],
-        limit: float = math.inf,
-        most: int | None = None,
-    ) -> NDArray[np.int32]:
-        crossing = [
-            loop.tolist()
-            for loop in (*known, *self.generators)
-            if self.classes(loop) @ self.intersection @ target
-        ]
-        return shortest_in_class(self.surface, self.dual_forms, target, crossing, limit, most)
-
-    def length(self, loop: ArrayLike) -> float:
-        """Length of a closed polygon through vertices of the surface, in units of ``V``.
-
-        Raises
-        ------
-        ArrayError, IndexRangeError
-            The loop is no array (k,) of vertices.
-        """
-        points = self.surface.V[self._vertices(loop)]
-        return float(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).sum())
-
-    def classes(self, loop: ArrayLike) -> NDArray[np.int64]:
-        """Class (2g,) of a loop of edges over ``generators``: its periods, exact.
-
-        Raises
-        ------
-        ArrayError
-            The loop is no array (k,), or two consecutive vertices are not joined by an edge.
-        IndexRangeError
-            No vertex of the surface; ``ids`` are the places in the loop.
-        """
-        ids = self._vertices(loop).tolist()
-        return _core.homology.periods(self.surface.topology, self.dual_forms, ids).astype(np.int64)
-
-    def _vertices(self, loop: ArrayLike) -> NDArray[np.int64]:
-        return as_integers(loop, "loop", (None,), 0, self.surface.n_vertices - 1)
+        return walk_below(self, np.asarray(coefficients), limit)
 
     def require_torus(self) -> None:
         """Raise `GenusError` unless the genus is one."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,54 +13,105 @@ from ..base.arrays import read_only
 from .walks import joined_loops, shortest_cycles, shortest_in_class
 
 if TYPE_CHECKING:
-    from ..mesh.meshes import TriMesh
+    from .generators import Generators
 
-__all__ = ["Generated", "ShortestBasis", "short_loops", "shortest_walk", "walk_below"]
+__all__ = ["ShortestBasis", "searched", "short_loops", "shortest_walk", "walk_below"]
 
 _ROOTS = 4  # vertices of a loop from which others are looked for
 _CANDIDATES = 20  # loops to be exchanged, per member of a basis
-_MOST_SETTLED = 20_000_000  # nodes of the cover in search of a walk, by the square of the genus
-_NONE = np.zeros(0, np.int32)
+# Nodes of the cover, at most, in search of a loop: more than surfaces of small genus take, by the
+# square of the genus, or fine ones.
+_MOST_SETTLED, _SETTLED_A_FACE = 20_000_000, 50
+
+_Loops = tuple[NDArray[np.int32], ...]
 
 
-@dataclass(frozen=True)
-class Generated:
-    """A surface of genus two or more with generators, their dual forms and their intersections."""
-
-    surface: TriMesh
-    generators: tuple[NDArray[np.int32], ...]
-    dual_forms: NDArray[np.int32]
-    intersection: NDArray[np.int64]
-
-    @property
-    def genus(self) -> int:
-        """The genus."""
-        return len(self.generators) // 2
-
-    def classes(self, loop: NDArray[np.int32]) -> NDArray[np.int64]:
-        """Class (2g,) of a loop over the generators."""
-        top = self.surface.topology
-        return _core.homology.periods(top, self.dual_forms, loop.tolist()).astype(np.int64)
-
-    def length(self, loop: NDArray[np.int32]) -> float:
-        """Length of a loop."""
-        points = self.surface.V[loop]
-        return float(np.linalg.norm(points - points[np.arange(len(loop)) - 1], axis=1).sum())
-
-
-def short_loops(basis: Generated, rows: NDArray[np.int64]) -> tuple[NDArray[np.int32], ...]:
-    """Loops of a basis of the lattice of some classes, as short as exchanges make them.
+def short_loops(basis: Generators, rows: NDArray[np.int64], known: _Loops) -> _Loops:
+    """The shortest loop of each of some classes or, if that takes too long, of a basis of these.
 
     Parameters
     ----------
-    basis : Generated
+    basis : Generators
     rows : (g, 2g) array of int64
         Its handle or its tunnel classes.
+    known : tuple of (k,) ndarray of int32
+        Loops that the former may cross.
 
     Returns
     -------
     tuple of (k,) ndarray of int32
     """
+    loops = []
+    for row in rows:
+        loop = searched(basis, row, known, most=_most_settled(basis))
+        if not len(loop):
+            return _exchanged_loops(basis, rows)
+        loops.append(loop)
+    return tuple(loops)
+
+
+def shortest_walk(basis: Generators, row: NDArray[np.int64]) -> NDArray[np.int32]:
+    """The shortest loop of a class.
+
+    Time grows exponentially with the genus only where the shortest cycle of the class is in pieces.
+    """
+    loop = searched(basis, row, most=_most_settled(basis))
+    return loop if len(loop) else _walk(basis, row, _cycles(basis, row), None)
+
+
+def walk_below(basis: Generators, row: NDArray[np.int64], limit: float) -> NDArray[np.int32] | None:
+    """The shortest loop of a class, None if it is not shorter than a limit."""
+    # Balls of the cover of that radius may well take less time than minimum cuts of the surface.
+    if basis.surface.n_faces > (3 * basis.genus) ** 2:
+        loop = searched(basis, row, limit=limit)
+        return loop if len(loop) else None
+    cycles = _cycles(basis, row)
+    if not sum(basis.length(cycle) for cycle in cycles) < limit:
+        return None
+    loop = _walk(basis, row, cycles, _most_settled(basis))
+    return loop if basis.length(loop) < limit else None
+
+
+def searched(
+    basis: Generators,
+    row: NDArray[np.int64],
+    known: _Loops = (),
+    *,
+    limit: float = math.inf,
+    most: int | None = None,
+) -> NDArray[np.int32]:
+    """The shortest loop of a class by search of the cover.
+
+    Parameters
+    ----------
+    basis : Generators
+    row : (2g,) array of int64
+    known : tuple of (k,) ndarray of int32
+        Loops besides the generators that it may cross.
+    limit : float
+        None is returned that is not shorter.
+    most : int, optional
+        Nodes of the cover that may be settled.
+
+    Returns
+    -------
+    (k,) ndarray of int32
+        Empty if there is none below the limit, or none was found in time.
+    """
+    meets = basis.intersection @ row
+    crossing = [loop.tolist() for loop in known if basis.classes(loop) @ meets]
+    crossing += [basis.generators[i].tolist() for i in np.flatnonzero(meets)]
+    return shortest_in_class(basis.surface, basis.dual_forms, row, crossing, limit, most)
+
+
+def _most_settled(basis: Generators) -> int | None:
+    if basis.genus < 2:
+        return None
+    return max(_MOST_SETTLED // basis.genus**2, _SETTLED_A_FACE * basis.surface.n_faces)
+
+
+def _exchanged_loops(basis: Generators, rows: NDArray[np.int64]) -> _Loops:
+    """Loops of a basis of the lattice of some classes, as short as exchanges make them."""
     found = ShortestBasis(rows)
     for k in range(len(rows)):
         if found.loops[k] is None:
@@ -73,77 +123,36 @@ def short_loops(basis: Generated, rows: NDArray[np.int64]) -> tuple[NDArray[np.i
     return tuple(loop for loop in found.loops if loop is not None)
 
 
-def shortest_walk(basis: Generated, row: NDArray[np.int64]) -> NDArray[np.int32]:
-    """The shortest loop of a class, for a surface of genus two or more.
-
-    Time grows exponentially with the genus only where the shortest cycle of the class is in pieces.
-    """
-    loop = _searched_nearby(basis, row)
-    return loop if len(loop) else _walk(basis, row, _cycles(basis, row), None)
-
-
-def walk_below(basis: Generated, row: NDArray[np.int64], limit: float) -> NDArray[np.int32]:
-    """The shortest loop of a class, none if it is not shorter than a limit."""
-    if _is_fine(basis):
-        return _searched(basis, row, limit, None)
-    cycles = _cycles(basis, row)
-    if not sum(basis.length(cycle) for cycle in cycles) < limit:
-        return _NONE
-    loop = _walk(basis, row, cycles, _MOST_SETTLED // basis.genus**2)
-    return loop if basis.length(loop) < limit else _NONE
-
-
-def _is_fine(basis: Generated) -> bool:
-    """Whether balls of the cover may well take less time than minimum cuts of the surface."""
-    return basis.surface.n_faces > (3 * basis.genus) ** 2
-
-
-def _find(basis: Generated, found: ShortestBasis, k: int) -> None:
+def _find(basis: Generators, found: ShortestBasis, k: int) -> None:
     """The shortest loop of member k, or shorter ones in its place."""
     row = found.rows[k]
-    loop = _searched_nearby(basis, row)
-    if not 0 < len(loop) == len(np.unique(loop)):
-        cycles = _cycles(basis, row)
-        _offer(basis, found, cycles)
-        if found.loops[k] is not None:
-            return
-        if not len(loop):
-            loop = _walk(basis, row, cycles, _MOST_SETTLED // basis.genus**2)
-    found.settle(k, loop, basis.length(loop))
+    cycles = _cycles(basis, row)
+    _offer(basis, found, cycles)
+    if found.loops[k] is None:
+        loop = _walk(basis, row, cycles, _most_settled(basis))
+        found.settle(k, loop, basis.length(loop))
 
 
-def _cycles(basis: Generated, row: NDArray[np.int64]) -> list[NDArray[np.int32]]:
+def _cycles(basis: Generators, row: NDArray[np.int64]) -> list[NDArray[np.int32]]:
     return shortest_cycles(basis.surface, basis.generators, row)
 
 
-def _searched_nearby(basis: Generated, row: NDArray[np.int64]) -> NDArray[np.int32]:
-    """The shortest loop of a class if it is found at once, as on fine surfaces of small genus."""
-    if not _is_fine(basis):
-        return _NONE
-    most = int(basis.surface.n_faces**1.5 / (3 * basis.genus))
-    return _searched(basis, row, math.inf, most)
-
-
 def _walk(
-    basis: Generated, row: NDArray[np.int64], cycles: list[NDArray[np.int32]], most: int | None
+    basis: Generators,
+    row: NDArray[np.int64],
+    cycles: list[NDArray[np.int32]],
+    most: int | None,
 ) -> NDArray[np.int32]:
     """One loop of the class of some shortest cycles: the shortest, if it is found in time."""
     joined = joined_loops(basis.surface, cycles)
     length, least = basis.length(joined), sum(basis.length(cycle) for cycle in cycles)
     if length <= (1 + 1e-12) * least:
         return joined
-    loop = _searched(basis, row, length, most)
+    loop = searched(basis, row, limit=length, most=most)
     return loop if len(loop) else joined
 
 
-def _searched(
-    basis: Generated, row: NDArray[np.int64], limit: float, most: int | None
-) -> NDArray[np.int32]:
-    crossing = [basis.generators[i].tolist() for i in np.flatnonzero(basis.intersection @ row)]
-    return shortest_in_class(basis.surface, basis.dual_forms, row, crossing, limit, most)
-
-
-def _offer(basis: Generated, found: ShortestBasis, loops: list[NDArray[np.int32]]) -> list[int]:
+def _offer(basis: Generators, found: ShortestBasis, loops: list[NDArray[np.int32]]) -> list[int]:
     """Offer loops, the first ones first, until none is taken; the members they have become."""
     offers = [(basis.classes(x), x, basis.length(x)) for x in loops]
     taken: set[int] = set()
@@ -154,7 +163,7 @@ def _offer(basis: Generated, found: ShortestBasis, loops: list[NDArray[np.int32]
         taken |= places - {-1}
 
 
-def _exchange(basis: Generated, found: ShortestBasis) -> list[int]:
+def _exchange(basis: Generators, found: ShortestBasis) -> list[int]:
     """Exchange loops for shorter ones through some of their vertices; the members exchanged.
 
     Classes are told apart by sums with random factors modulo 2^64.
