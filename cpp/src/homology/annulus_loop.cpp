@@ -35,14 +35,15 @@ CutGraph cut_open(const mesh::SurfaceTopology& top, const VecRef& edge_length,
   CutGraph graph;
   graph.tail.resize(top.twin.size());
   for (Index i = 0; i < top.n_vertices; ++i) {
-    const auto turn = [&](Index h) { return top.twin[mesh::SurfaceTopology::prev(h)]; };
     Index first = top.vertex_halfedge[i];
-    while (!is_cut[top.edge[first]] && turn(first) != top.vertex_halfedge[i]) first = turn(first);
+    while (!is_cut[top.edge[first]] && top.turned(first) != top.vertex_halfedge[i]) {
+      first = top.turned(first);
+    }
     Index h = first;
     do {
       if (h == first || is_cut[top.edge[h]]) graph.vertex.push_back(i);
       graph.tail[h] = graph.size() - 1;
-      h = turn(h);
+      h = top.turned(h);
     } while (h != first);
   }
   // An edge that is not cut is walked one way by each of its half-edges, a cut one both ways.

@@ -34,8 +34,7 @@ std::vector<Index> left_crossings(const mesh::SurfaceTopology& top, const Loop& 
   for (std::size_t k = 0; k < along.size(); ++k) {
     const Index incoming = along[(k + along.size() - 1) % along.size()];
     fan.clear();
-    for (Index h = top.twin[mesh::SurfaceTopology::prev(along[k])]; h != top.twin[incoming];
-         h = top.twin[mesh::SurfaceTopology::prev(h)]) {
+    for (Index h = top.turned(along[k]); h != top.twin[incoming]; h = top.turned(h)) {
       fan.push_back(h);
     }
     crossings.insert(crossings.end(), fan.rbegin(), fan.rend());

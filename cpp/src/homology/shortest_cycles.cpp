@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <functional>
 #include <limits>
-#include <queue>
 #include <utility>
 
 #include "homology/face_cut.hpp"
+#include "homology/shortest_paths.hpp"
 
 namespace stretchmap::homology {
 namespace {
@@ -51,7 +50,7 @@ class Walks {
         --left_[h];
         return h;
       }
-      h = top_.twin[mesh::SurfaceTopology::prev(h)];
+      h = top_.turned(h);
     } while (h != first);
     return -1;
   }
@@ -105,41 +104,6 @@ class Walks {
   std::vector<Index> left_;
 };
 
-// The half-edges of a shortest path from marked vertices to a vertex of `goal`.
-std::vector<Index> shortest_path(const mesh::SurfaceTopology& top, const VecRef& edge_length,
-                                 const std::vector<char>& marked, const std::vector<char>& goal) {
-  using Entry = std::pair<double, Index>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
-  std::vector<double> distance(top.n_vertices, std::numeric_limits<double>::infinity());
-  std::vector<Index> entered(top.n_vertices, -1), path;
-  for (Index i = 0; i < top.n_vertices; ++i) {
-    if (!marked[i]) continue;
-    distance[i] = 0.0;
-    queue.emplace(0.0, i);
-  }
-  while (!queue.empty()) {
-    const auto [so_far, i] = queue.top();
-    queue.pop();
-    if (so_far > distance[i]) continue;
-    if (goal[i]) {
-      for (Index k = i; entered[k] >= 0; k = top.tail(entered[k])) path.push_back(entered[k]);
-      break;
-    }
-    const Index first = top.vertex_halfedge[i];
-    Index h = first;
-    do {
-      const Index j = top.head(h);
-      if (const double there = so_far + edge_length[top.edge[h]]; there < distance[j]) {
-        distance[j] = there;
-        entered[j] = h;
-        queue.emplace(there, j);
-      }
-      h = top.twin[mesh::SurfaceTopology::prev(h)];
-    } while (h != first);
-  }
-  return path;
-}
-
 }  // namespace
 
 std::vector<Loop> shortest_cycles(const mesh::SurfaceTopology& top, const VecRef& edge_length,
@@ -173,29 +137,36 @@ Loop joined_loops(const mesh::SurfaceTopology& top, const VecRef& edge_length,
     apart.push_back(loop_halfedges(top, loop));
     for (const Index h : apart.back()) walks.add(h);
   }
-  std::vector<char> together(top.n_vertices, 0);
+  ShortestPaths paths(top, edge_length);
+  Loop together;
+  std::vector<char> is_together(top.n_vertices, 0);
+  const auto add = [&](Index i) {
+    if (!is_together[i]) together.push_back(i);
+    is_together[i] = 1;
+  };
   const auto take = [&](std::size_t l) {
-    for (const Index i : loops[l]) together[i] = 1;
+    for (const Index i : loops[l]) add(i);
     apart[l].clear();
   };
   if (!loops.empty()) take(0);
   for (;;) {
     std::vector<char> goal(top.n_vertices, 0);
     bool any = false;
-    for (std::size_t l = 0; l < loops.size(); ++l)
-      for (const Index h : apart[l]) {
-        goal[top.tail(h)] = 1;
-        any = true;
-      }
+    for (const std::vector<Index>& loop : apart)
+      for (const Index h : loop) goal[top.tail(h)] = any = true;
     if (!any) break;
-    const std::vector<Index> path = shortest_path(top, edge_length, together, goal);
-    for (const Index h : path) {
-      walks.add(h);
-      walks.add(top.twin[h]);
-      together[top.tail(h)] = together[top.head(h)] = 1;
+    Index end = -1;
+    paths.grow(together, std::numeric_limits<double>::infinity(), [&](Index i) {
+      if (goal[i]) end = i;
+      return goal[i] != 0;
+    });
+    for (Index i = end; i >= 0 && paths.entered(i) >= 0; i = top.tail(paths.entered(i))) {
+      walks.add(paths.entered(i));
+      walks.add(top.twin[paths.entered(i)]);
+      add(i);
     }
     for (std::size_t l = 0; l < loops.size(); ++l) {
-      const auto meets = [&](Index h) { return together[top.tail(h)] != 0; };
+      const auto meets = [&](Index h) { return is_together[top.tail(h)] != 0; };
       if (std::any_of(apart[l].begin(), apart[l].end(), meets)) take(l);
     }
   }

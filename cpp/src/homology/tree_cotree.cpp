@@ -3,47 +3,20 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
-#include <queue>
 #include <string>
 #include <utility>
 
+#include "homology/shortest_paths.hpp"
 #include "stretchmap/base/errors.hpp"
 
 namespace stretchmap::homology {
 namespace {
 
-struct PrimalTree {
-  std::vector<Index> parent;  // half-edge that enters the vertex, -1 at the root
-  std::vector<double> depth;  // distance from the root
-};
-
-PrimalTree shortest_path_tree(const mesh::SurfaceTopology& top, const VecRef& length) {
-  const double infinity = std::numeric_limits<double>::infinity();
-  PrimalTree tree{std::vector<Index>(top.n_vertices, -1),
-                  std::vector<double>(top.n_vertices, infinity)};
-  using Entry = std::pair<double, Index>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
-  tree.depth[0] = 0.0;
-  queue.emplace(0.0, 0);
-  while (!queue.empty()) {
-    const auto [distance, i] = queue.top();
-    queue.pop();
-    if (distance > tree.depth[i]) continue;
-    const Index first = top.vertex_halfedge[i];
-    Index h = first;
-    do {
-      const Index j = top.head(h);
-      const double candidate = distance + length[top.edge[h]];
-      if (candidate < tree.depth[j]) {
-        tree.depth[j] = candidate;
-        tree.parent[j] = h;
-        queue.emplace(candidate, j);
-      }
-      h = top.twin[mesh::SurfaceTopology::prev(h)];
-    } while (h != first);
-  }
+ShortestPaths shortest_path_tree(const mesh::SurfaceTopology& top, const VecRef& edge_length) {
+  ShortestPaths tree(top, edge_length);
+  tree.grow({0}, std::numeric_limits<double>::infinity(), [](Index) { return false; });
   for (Index i = 0; i < top.n_vertices; ++i) {
-    if (tree.depth[i] == infinity) {
+    if (!tree.reached(i)) {
       throw Error("ConnectivityError",
                   "vertex " + std::to_string(i) +
                       " is not joined to vertex 0: the surface has more than one component, or a "
@@ -62,17 +35,18 @@ Index find_root(std::vector<Index>& leader, Index f) {
 // Kruskal on the dual graph, longest closing loop first. Marks the edges that the cotree crosses
 // and returns those that neither tree uses, shortest closing loop first.
 std::vector<Index> grow_cotree(const mesh::SurfaceTopology& top, const VecRef& length,
-                               const PrimalTree& tree, std::vector<char>& crossed) {
+                               const ShortestPaths& tree, std::vector<char>& crossed) {
   const Index n_edges = static_cast<Index>(top.edges.rows());
   std::vector<char> in_tree(n_edges, 0);
-  for (const Index h : tree.parent) {
-    if (h >= 0) in_tree[top.edge[h]] = 1;
+  for (Index i = 0; i < top.n_vertices; ++i) {
+    if (tree.entered(i) >= 0) in_tree[top.edge[tree.entered(i)]] = 1;
   }
   std::vector<std::pair<double, Index>> order;
   order.reserve(n_edges - top.n_vertices + 1);
   for (Index e = 0; e < n_edges; ++e) {
     if (in_tree[e]) continue;
-    order.emplace_back(tree.depth[top.edges(e, 0)] + tree.depth[top.edges(e, 1)] + length[e], e);
+    order.emplace_back(tree.distance(top.edges(e, 0)) + tree.distance(top.edges(e, 1)) + length[e],
+                       e);
   }
   std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
     return a.first != b.first ? a.first > b.first : a.second < b.second;
@@ -112,29 +86,10 @@ std::vector<Index> dual_parents(const mesh::SurfaceTopology& top,
   return parent;
 }
 
-std::vector<Index> path_from_root(const mesh::SurfaceTopology& top, const PrimalTree& tree,
-                                  Index i) {
-  std::vector<Index> path{i};
-  while (tree.parent[i] >= 0) path.push_back(i = top.tail(tree.parent[i]));
-  std::reverse(path.begin(), path.end());
-  return path;
-}
-
-// Tree path to the tail, the half-edge itself, tree path back; the common part dropped.
-Loop close_loop(const mesh::SurfaceTopology& top, const PrimalTree& tree, Index h) {
-  const std::vector<Index> there = path_from_root(top, tree, top.tail(h));
-  const std::vector<Index> back = path_from_root(top, tree, top.head(h));
-  std::size_t common = 1;
-  while (common < std::min(there.size(), back.size()) && there[common] == back[common]) ++common;
-  Loop loop(there.begin() + (common - 1), there.end());
-  loop.insert(loop.end(), back.rbegin(), back.rend() - common);
-  return loop;
-}
-
 }  // namespace
 
 HomologyGenerators tree_cotree(const mesh::SurfaceTopology& top, const VecRef& edge_length) {
-  const PrimalTree tree = shortest_path_tree(top, edge_length);
+  const ShortestPaths tree = shortest_path_tree(top, edge_length);
   std::vector<char> crossed;
   const std::vector<Index> left_over = grow_cotree(top, edge_length, tree, crossed);
   const std::vector<Index> parent = dual_parents(top, crossed);
@@ -143,7 +98,7 @@ HomologyGenerators tree_cotree(const mesh::SurfaceTopology& top, const VecRef& e
   result.forms.setZero(left_over.size(), top.edges.rows());
   for (std::size_t i = 0; i < left_over.size(); ++i) {
     const Index h = top.edge_halfedge[left_over[i]];
-    result.loops.push_back(close_loop(top, tree, h));
+    result.loops.push_back(tree.loop_closed_by(h));
     // The dual loop crosses h from left to right and returns through the cotree. A half-edge
     // crossed from left to right counts +1; the parts common to both tree paths cancel.
     auto form = result.forms.row(i);
@@ -164,7 +119,7 @@ Index find_halfedge(const mesh::SurfaceTopology& top, Index i, Index j) {
   Index h = first;
   do {
     if (top.head(h) == j) return h;
-    h = top.twin[mesh::SurfaceTopology::prev(h)];
+    h = top.turned(h);
   } while (h != first);
   return -1;
 }

@@ -24,8 +24,20 @@ struct SurfaceTopology {
   Index head(Index h) const { return faces(h / 3, (h + 1) % 3); }
   static Index next(Index h) { return h % 3 == 2 ? h - 2 : h + 1; }
   static Index prev(Index h) { return h % 3 == 0 ? h + 2 : h - 1; }
+  // The half-edge from the same tail that follows clockwise; -1 on a border.
+  Index turned(Index h) const { return twin[prev(h)]; }
   // +1 when the half-edge runs along its edge's orientation, else -1.
   double sign(Index h) const { return tail(h) < head(h) ? 1.0 : -1.0; }
+
+  // visit(h) for the half-edges from a vertex that lies on no border.
+  template <class Visit>
+  void each_outgoing(Index i, const Visit& visit) const {
+    Index h = vertex_halfedge[i];
+    do {
+      visit(h);
+      h = turned(h);
+    } while (h != vertex_halfedge[i]);
+  }
 };
 
 // \pre indices in [0, n_vertices), no face repeats a vertex.
