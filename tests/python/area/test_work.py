@@ -201,8 +201,8 @@ def test_there_may_be_more_faces_and_steps_with_more_time() -> None:
 
 
 def test_a_small_hole_gets_as_many_faces_as_it_needs() -> None:
-    surface = small_handle(2, 3.2)
-    result = sm.area_map(surface)  # with a tenth of the time the face SD is 0.12
+    surface = small_handle(3, 3.2)
+    result = sm.area_map(surface)  # with a tenth of the time the face SD is 0.13
     assert result.certificate.certified and result.distortion.element_std <= 0.01
     assert result.mesh.n_faces > 2.5 * surface.n_faces + 12_000
 

@@ -14,6 +14,7 @@ from stretchmap.errors import (
     SelfIntersectionError,
     SolverError,
 )
+from stretchmap.mesh import tetrahedralize as tetrahedralizing
 
 SOLID_TORI = {
     "standard": samples.solid_torus,
@@ -189,15 +190,26 @@ def test_tetrahedralize_names_what_is_wrong_with_a_surface():
         samples.tetrahedralize(TriMesh(surface.V, np.vstack([surface.F, surface.F[:1]])))
 
 
-def test_tetrahedralize_makes_as_many_tets_as_their_volume_asks_for():
+def test_tetrahedralize_makes_as_many_tets_as_their_volume_asks_for(monkeypatch):
     pytest.importorskip("tetgen")
-    surface = samples.torus_surface(90, 36)
-    volume = surface.volume / 4.5e5
+    surface = samples.torus_surface(40, 16)
+    volume, run = surface.volume / 6e4, tetrahedralizing._run_tetgen
     solid = samples.tetrahedralize(surface, max_volume=volume, quality=10.0)
-    assert solid.n_vertices > 110_000  # where tetgen ends if it is not told otherwise
-    assert np.mean(solid.tet_volumes > volume) < 0.1  # those by the surface, which is not refined
+    by_surface = (solid.T < surface.n_vertices).any(axis=1)  # which is not refined
+    assert by_surface.mean() < 0.2 and np.mean(solid.tet_volumes[~by_surface] > volume) < 0.03
     with pytest.raises(OptionError, match="GiB"):
         samples.tetrahedralize(surface, max_volume=1e-9 * volume)
+    # Vertices tetgen may add: it ends at 100,000 if it is not told otherwise.
+    allowed = []
+
+    def limited(surface, options):
+        allowed.append(options["steinerleft"])
+        return run(surface, {**options, "steinerleft": 5000})
+
+    monkeypatch.setattr(tetrahedralizing, "_run_tetgen", limited)
+    few = samples.tetrahedralize(surface, max_volume=volume, quality=10.0)
+    assert allowed == [-1]
+    assert few.n_vertices - surface.n_vertices == 5000 < 0.7 * solid.n_vertices
 
 
 def test_tetrahedralize_says_what_it_could_not_keep():
