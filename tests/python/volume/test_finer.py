@@ -56,9 +56,7 @@ def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
     solids = [plate(*shape) for shape in short + long] * 2
     # With time for all rounds on slow processors, too.
     exact = [
-        sm.VolumeOptions(cg_tol=tol, time_limit=5e-3)
-        for tol in (0.05, 0.001)
-        for _ in short + long
+        sm.VolumeOptions(cg_tol=tol, time_limit=5e-3) for tol in (0.05, 0.001) for _ in short + long
     ]
 
     def maps() -> list[sm.VolumeMap]:
