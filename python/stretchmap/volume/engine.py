@@ -39,6 +39,7 @@ _log = logging.getLogger("stretchmap")
 # are for have so many times the mean energy.
 _UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, 3.0
 _FINER = 0.7  # share of the time left that this may take
+_GAINED = 0.99  # of how uneven volumes were, at most: else the vertices are taken back
 
 
 def solve(
@@ -143,11 +144,14 @@ def _minimize(run: Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNe
         del done  # the next stage has a Hessian of its own, and memory need not hold both
         _core.base.give_free_memory_back()
     if glide:
+        finer = o.volume_weight >= VolumeOptions.volume_weight and free == (1.0, 1.0)
+        finer = finer and run.problem.refinement is not None and not len(run.problem.held)
         with run.timed("glide"):
             first = o.volume_weight if run.problem.warm else goal
             done = minimize(
                 history.model, run.x, history, glide=True, start=first, goal=o.volume_weight,
                 free=free, asked=None if run.problem.warm else history.model.targets,
+                leave=(lambda x: _is_uneven(run.problem, x)) if finer else None,
             )  # fmt: skip
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
             if certify(run.problem.solid, run.x, run.problem.torus).certified:
@@ -161,8 +165,7 @@ def _minimize(run: Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNe
                         start=goal if released else o.volume_weight, goal=o.volume_weight,
                         free=free,
                     )  # fmt: skip
-        alone = o.volume_weight >= VolumeOptions.volume_weight and free == (1.0, 1.0)
-        if done.converged and alone and not len(run.problem.held):
+        if finer and (done.converged or done.left):
             with run.timed("finer"):
                 done = _finer(run, done)
         converged, reason, newton = done.converged, done.reason, done.newton
@@ -174,33 +177,59 @@ def _minimize(run: Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNe
 
 
 def _finer(run: Run, done: Minimized) -> Minimized:
-    """The same with more vertices in the tets that keep volumes worst, if that ends in time."""
+    """With more vertices in the tets that keep volumes worst, as often as that helps in time.
+
+    Then on until nothing more is gained.
+    """
     o, history = run.options, run.history
     whole, history.budget = history.budget, history.budget.share(_FINER)
     for _ in range(_FINER_ROUNDS):
         run.x = done.x
         before, edges = run.problem, _uneven_edges(run.problem)
-        if before.refinement is None or not len(edges):
+        if not len(edges) or history.budget.spent:
             break
         run.take(before.halved(edges))
         more = minimize(
-            history.model, run.x, history, glide=True, start=o.volume_weight, goal=o.volume_weight
-        )
-        if not more.converged:
+            history.model, run.x, history, glide=True, start=o.volume_weight,
+            goal=o.volume_weight, leave=lambda x: _is_uneven(run.problem, x),
+        )  # fmt: skip
+        if not _unevenness(run.problem, more.x) < _GAINED * _unevenness(before, before.x):
             run.take(before)
             break
         done = more
         _log.info("volumes are kept badly: %d edges halved", len(edges))
     history.budget = whole
+    if not done.converged:
+        run.x = done.x
+        done = minimize(
+            history.model, run.x, history, glide=True, start=o.volume_weight, goal=o.volume_weight
+        )
     return done
+
+
+def _ratios(
+    problem: VolumeProblem, x: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Volume ratios of the tets, and their volumes."""
+    volumes = _core.mesh.tet_volumes(problem.V, problem.solid.T)
+    return _core.mesh.tet_volumes(x, problem.solid.T) / volumes, volumes
+
+
+def _unevenness(problem: VolumeProblem, x: NDArray[np.float64]) -> float:
+    """Mean abs(ratio - 1) over the volume."""
+    ratios, volumes = _ratios(problem, x)
+    return float(np.average(np.abs(ratios - 1.0), weights=volumes))
+
+
+def _is_uneven(problem: VolumeProblem, x: NDArray[np.float64]) -> bool:
+    return bool(np.abs(_ratios(problem, x)[0] - 1.0).mean() > _UNEVEN)
 
 
 def _uneven_edges(problem: VolumeProblem) -> NDArray[np.int32]:
     """The longest edges of the tets whose volume is kept worst; none if all keep it well enough."""
-    volumes = _core.mesh.tet_volumes(problem.V, problem.solid.T)
-    ratios = _core.mesh.tet_volumes(problem.x, problem.solid.T) / volumes
-    if not np.abs(ratios - 1.0).mean() > _UNEVEN:
+    if not _is_uneven(problem, problem.x):
         return np.empty((0, 2), np.int32)
+    ratios, volumes = _ratios(problem, problem.x)
     energy = 0.5 * (ratios + 1.0 / ratios) - 1.0
     poor = (energy > _POOR * np.average(energy, weights=volumes)) & (volumes > volumes.mean())
     return longest_inner_edges(problem.solid, problem.V, np.flatnonzero(poor))

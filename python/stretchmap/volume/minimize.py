@@ -9,6 +9,7 @@ where other volumes are asked for.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,6 +31,9 @@ IDLE = 20  # steps in a row that gain next to nothing prove it all the same
 # share at which one shows that there is little left, show it, too: what one gains is much or little
 # by turns. Where single elements cut steps short, the energy falls as slowly for a hundred of them.
 _STEPS, _SLOWLY = 8, 2.0
+# So many steps that lower the energy by a smaller share than that are worth less than more vertices
+# where volumes are kept badly: the energy falls on for hundreds, and less than those gain at once.
+_LATELY, _LITTLE = 10, 0.1
 # Times the residual asked for at the last weight, before it: the next weight moves all again.
 _ROUGHLY = 2.0
 _REST = 1  # steps with a Hessian each after one was too old
@@ -59,12 +63,15 @@ class Minimized:
     reason : str
     newton : SolidNewton
         The minimizer, with its last Hessian.
+    left : bool
+        Whether it left off early, as asked.
     """
 
     x: NDArray[np.float64]
     converged: bool
     reason: str
     newton: _core.volume.SolidNewton
+    left: bool = False
 
 
 @dataclass
@@ -135,6 +142,7 @@ class _Standstill:
     doubt: int = 0
     idle: int = 0
     energies: list[float] = field(default_factory=list)  # before the last steps, none short
+    lately: list[float] = field(default_factory=list)  # after the last steps
 
     def shown(self, step: _core.volume.NewtonReport, enough: float) -> bool:
         """Of a step of which a gain of ``enough`` would be worth while."""
@@ -157,6 +165,14 @@ class _Standstill:
         enough = _STEPS * _SLOWLY * share * min(after, most)
         return len(self.energies) == _STEPS and self.energies[0] - after <= enough
 
+    def little(self, after: float) -> bool:
+        """Whether the last steps, short ones among them, lowered the energy by but a small share.
+
+        To be told of all steps with the same weights.
+        """
+        self.lately = [*self.lately[-_LATELY:], after]
+        return len(self.lately) > _LATELY and after > (1.0 - _LITTLE) * self.lately[0]
+
 
 def grown(weight: float, alpha: float, growth: float, goal: float) -> float:
     """Lambda after a step of length ``alpha``; slower where single tets cut steps short: what is
@@ -174,6 +190,7 @@ def minimize(
     goal: float,
     free: tuple[float, float] = (1.0, 1.0),
     asked: NDArray[np.float64] | None = None,
+    leave: Callable[[NDArray[np.float64]], bool] | None = None,
 ) -> Minimized:
     """Newton steps with lambda growing from ``start`` to ``goal``; no tet turns over.
 
@@ -193,6 +210,8 @@ def minimize(
     asked : ndarray, shape (k,), optional
         If ``glide``: volumes relative to the tets' shares that are asked for to begin with. Before
         lambda grows they become even, a little after each step that was not cut short.
+    leave : callable, optional
+        Whether to leave off from there, asked once at the last weight, when steps gain little.
     """
     o = model.options
     stage, total, tolerance, face = (
@@ -241,6 +260,10 @@ def minimize(
             goals = volumes.volumes
             newton.set_targets(goals)
             continue
+        if leave and weight >= o.volume_weight and standstill.little(after):
+            if leave(x):
+                return Minimized(x, False, "more vertices would gain more", newton, left=True)
+            leave = None
         small = standstill.shown(step, weight * tolerance * min(before, fair))
         if glide and volumes_alone and weight >= o.volume_weight:
             small = standstill.slow(step.alpha, before, after, tolerance, fair) or small

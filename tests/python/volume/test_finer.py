@@ -114,22 +114,24 @@ def test_no_vertices_where_they_are_not_allowed(solid):
 
 
 @pytest.mark.parametrize("served", [0, 1])
-def test_a_round_that_does_not_end_in_time_is_taken_back(solid, finer, monkeypatch, served):
+def test_a_round_that_gains_nothing_is_taken_back(solid, finer, monkeypatch, served):
     minimize, outcome, rounds, left = engine.minimize, engine._outcome, [], []
 
-    def cut_off(model, x, history, *, glide, start, goal, **keywords):
-        done = minimize(model, x, history, glide=glide, start=start, goal=goal, **keywords)
-        if not glide or start < goal:
-            rounds.clear()
+    def gaining_once(model, x, history, *, glide, start, goal, leave=None, **keywords):
+        first = x.copy()
+        done = minimize(
+            model, x, history, glide=glide, start=start, goal=goal, leave=leave, **keywords
+        )
+        if not glide or start < goal or leave is None:
             return done
         rounds.append(history.budget.seconds)
-        return dataclasses.replace(done, converged=len(rounds) <= served)
+        return done if len(rounds) <= served else dataclasses.replace(done, x=first)
 
     def ended(run, *arguments):
         left.append(run.history.budget.seconds)
         return outcome(run, *arguments)
 
-    monkeypatch.setattr(engine, "minimize", cut_off)
+    monkeypatch.setattr(engine, "minimize", gaining_once)
     monkeypatch.setattr(engine, "_outcome", ended)
     result = sm.volume_map(solid)
     assert result.converged and result.certificate.certified
@@ -138,6 +140,25 @@ def test_a_round_that_does_not_end_in_time_is_taken_back(solid, finer, monkeypat
     ]
     assert len(rounds) == served + 1
     assert max(rounds) < 0.75 * left[-1]  # what follows has all of the time again
+
+
+def test_a_round_cut_off_by_time_is_kept_where_volumes_gain(solid, monkeypatch):
+    minimize, rounds = engine.minimize, []
+
+    def cut_off(model, x, history, *, leave=None, **keywords):
+        done = minimize(model, x, history, leave=leave, **keywords)
+        if not keywords["glide"] or keywords["start"] < keywords["goal"]:
+            return done
+        rounds.append(leave is not None)
+        if leave is not None:
+            history.budget = history.budget.share(0.0)
+            done = dataclasses.replace(done, converged=False, left=False)
+        return done
+
+    monkeypatch.setattr(engine, "minimize", cut_off)
+    result = sm.volume_map(solid)
+    assert len(result.refinement.halved) == 1 and rounds == [True, False]
+    assert result.converged and result.certificate.certified  # by the steps after it
 
 
 def test_vertices_are_for_large_tets_that_keep_their_volume_worst(monkeypatch):
