@@ -13,6 +13,7 @@ from stretchmap import _core
 from stretchmap.mesh.refinement import longest_inner_edges, refine_overconstrained
 from stretchmap.samples.solids import cut_cells
 from stretchmap.volume import engine
+from stretchmap.volume import minimize as minimizing
 from stretchmap.volume.problem import VolumeProblem
 
 
@@ -90,6 +91,18 @@ def test_rounds_go_on_while_volumes_are_kept_badly(monkeypatch):
     assert all(result.converged for result in all_rounds)
     left, before = (sum(map(unevenness, made, solids)) for made in (all_rounds, two_rounds))
     assert left < 0.93 * before
+
+
+def test_vertices_come_once_steps_gain_little(monkeypatch):
+    solids = [mug(5, 2, 5), plate(8, 3, 3), plate(9, 5, 3)]
+    early = [sm.volume_map(each) for each in solids]
+    monkeypatch.setattr(minimizing, "_LITTLE", -np.inf)  # once they gain nothing
+    late = [sm.volume_map(each) for each in solids]
+    assert all(each.converged and each.certificate.certified for each in early)
+    steps, before = (sum(len(each.history) for each in made) for made in (early, late))
+    assert steps < 0.9 * before
+    left, least = (sum(map(unevenness, made, solids)) for made in (early, late))
+    assert left < 1.05 * least
 
 
 def test_what_keeps_volumes_well_is_left_as_it_is(solid, monkeypatch):
