@@ -89,7 +89,7 @@ def searched(
     known : tuple of (k,) ndarray of int32
         Loops besides the generators that it may cross.
     limit : float
-        None is returned that is not shorter.
+        A loop that is not shorter is not returned.
     most : int, optional
         Nodes of the cover that may be settled.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 import time
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,14 +145,14 @@ def _minimize(run: Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNe
         del done  # the next stage has a Hessian of its own, and memory need not hold both
         _core.base.give_free_memory_back()
     if glide:
-        finer = o.volume_weight >= VolumeOptions.volume_weight and free == (1.0, 1.0)
-        finer = finer and run.problem.refinement is not None and not len(run.problem.held)
+        alone = o.volume_weight >= VolumeOptions.volume_weight and free == (1.0, 1.0)
+        refines = alone and run.problem.refinement is not None
+        leave = None if len(run.problem.held) or not refines else partial(_is_uneven, run.problem)
         with run.timed("glide"):
             first = o.volume_weight if run.problem.warm else goal
             done = minimize(
                 history.model, run.x, history, glide=True, start=first, goal=o.volume_weight,
-                free=free, asked=None if run.problem.warm else history.model.targets,
-                leave=(lambda x: _is_uneven(run.problem, x)) if finer else None,
+                free=free, asked=None if run.problem.warm else history.model.targets, leave=leave,
             )  # fmt: skip
         if len(run.problem.held) and _keep(run, done.x, True, "the map so far is kept"):
             if certify(run.problem.solid, run.x, run.problem.torus).certified:
@@ -165,7 +166,7 @@ def _minimize(run: Run, *, glide: bool) -> tuple[bool, str, _core.volume.SolidNe
                         start=goal if released else o.volume_weight, goal=o.volume_weight,
                         free=free,
                     )  # fmt: skip
-        if finer and (done.converged or done.left):
+        if refines and (done.converged or done.left) and not len(run.problem.held):
             with run.timed("finer"):
                 done = _finer(run, done)
         converged, reason, newton = done.converged, done.reason, done.newton
@@ -191,7 +192,7 @@ def _finer(run: Run, done: Minimized) -> Minimized:
         run.take(before.halved(edges))
         more = minimize(
             history.model, run.x, history, glide=True, start=o.volume_weight,
-            goal=o.volume_weight, leave=lambda x: _is_uneven(run.problem, x),
+            goal=o.volume_weight, leave=partial(_is_uneven, run.problem),
         )  # fmt: skip
         if not _unevenness(run.problem, more.x) < _GAINED * _unevenness(before, before.x):
             run.take(before)

@@ -212,6 +212,17 @@ def test_one_that_cannot_be_released_is_gone_on_with_all_the_same(problem, monke
     assert not outcome.converged and outcome.stop_reason == "9 vertices of folded faces are held"
 
 
+@pytest.mark.parametrize("released", [True, False])
+def test_vertices_are_for_a_boundary_that_is_not_held_or_no_longer(problem, monkeypatch, released):
+    asked = []
+    monkeypatch.setattr(engine, "_finer", lambda run, done: asked.append(run) or done)
+    if not released:
+        monkeypatch.setattr(engine, "release", lambda run: False)
+    outcome = solved_after_holding(problem, monkeypatch)
+    assert problem.refinement is not None and len(asked) == released
+    assert outcome.converged == released
+
+
 def test_what_gliding_has_untangled_is_not_untangled_once_more(problem, monkeypatch):
     """Nor is a map that stays short of the floor, which the second time would search in vain."""
     called = []
