@@ -41,8 +41,9 @@ __all__ = [
 _WIDEST, _WIDEST_SOFT, _NARROW = 1.0, 5.0, 0.1
 # Share of its determinant that the epsilon of an inverted tet is at least. With one epsilon for all
 # those inverted farthest have nearly all of the energy, and single ones hold up every step; with a
-# share of 1 the others' shapes outweigh them, and they stay where they are.
-_SOFT = 0.2
+# share of 1 the others' shapes outweigh them, and they stay where they are. Single ones do with any
+# share: it is for where so many first steps are no longer than `_SHORT` in the mean.
+_SOFT, _FIRST = 0.2, 4
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
 # What the regularized worst determinant is to come down to, of what it is: as published, and where
@@ -196,8 +197,9 @@ def untangle_whole(
     hasty : bool
         Leave them all to the patches where steps stay short or cure single ones.
     soft : bool
-        Keep what is inverted far from holding up all else: long steps that leave few inverted, but
-        those farther than they were. With a boundary that does not glide.
+        Where the first steps are short, keep what is inverted far from holding up all else: long
+        steps that leave few inverted, but those farther than they were. With a boundary that does
+        not glide.
     """
     o = model.options
     newton = model.newton(x, glide=glide, weights=model.roomy_weights)
@@ -211,28 +213,39 @@ def untangle_whole(
         soon = hasty and epsilon <= _NARROW and left <= MOST_STUCK * len(model.T)
         return min(_HASTY_PATIENCE, o.patience) if soon else o.patience
 
+    lengths: list[float] = []
+
     def note(
         iteration: int, at: NDArray[np.float64], step: _core.volume.NewtonReport, epsilon: float
     ) -> None:
+        lengths.append(step.alpha)
         history.add(
             "untangle", iteration, at, energy=step.after.energy, step=step.alpha,
             residual=epsilon, total=o.untangle_iter,
         )  # fmt: skip
 
-    return _continue(
-        newton,
-        x,
-        face=o.face_weight if glide else 0.0,
-        floor=o.floor,
-        steps=o.untangle_iter,
-        enough=lambda left, since, epsilon: since >= patience(left, epsilon),
-        hasty=hasty,
-        soft=_SOFT if soft else 0.0,
-        widest=_WIDEST_SOFT if soft else _WIDEST,
-        linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
-        budget=history.budget,
-        note=note,
-    )
+    def held_up() -> bool:
+        first = lengths[:_FIRST]
+        return soft and len(first) == _FIRST and sum(first) <= _FIRST * _SHORT
+
+    def follow(share: float, widest: float, ends: Callable[[], bool]) -> Untangled:
+        return _continue(
+            newton,
+            x,
+            face=o.face_weight if glide else 0.0,
+            floor=o.floor,
+            steps=o.untangle_iter,
+            enough=lambda left, since, epsilon: ends() or since >= patience(left, epsilon),
+            hasty=hasty,
+            soft=share,
+            widest=widest,
+            linear=_core.volume.NewtonOptions(tol=min(o.cg_tol, 1e-2), max_cg=o.max_cg),
+            budget=history.budget,
+            note=note,
+        )
+
+    done = follow(0.0, _WIDEST, held_up)
+    return follow(_SOFT, _WIDEST_SOFT, lambda: False) if held_up() else done
 
 
 def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.intp]:

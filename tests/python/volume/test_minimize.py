@@ -161,7 +161,7 @@ def error_of(plates: list[sm.TetMesh], tols: tuple[float, ...]) -> float:
 
 def test_growing_step_by_step_leads_to_better_volumes(monkeypatch):
     """Of plates with an inside, the SDs are three quarters; the steps are as many."""
-    thick = [plate(n, 8, 2) for n in range(6, 10)]
+    thick = [plate(n, m, 2) for n in range(6, 12) for m in (6, 8)]
     thin = [plate(n, m, 1) for m in (4, 6) for n in range(6, 15, 4)]
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
     error, error_thin = error_of(thick, (0.05,)), error_of(thin, (0.05, 0.02))

@@ -23,7 +23,7 @@ class Dragging:
     def __init__(self, left: int, alpha: float = 1.0, worst: float = -0.01) -> None:
         self.left, self.alpha, self.worst = left, alpha, worst
         self.epsilons: list[float] = []
-        self.soft: set[float] = set()
+        self.soft: list[float] = []
 
     def value(self, _x, _weights):
         return SimpleNamespace(
@@ -32,7 +32,7 @@ class Dragging:
 
     def step(self, x, weights, _linear):
         self.epsilons.append(weights.epsilon)
-        self.soft.add(weights.soft)
+        self.soft.append(weights.soft)
         here = self.value(x, weights)
         return x, SimpleNamespace(before=here, after=here, alpha=self.alpha)
 
@@ -207,6 +207,24 @@ def test_what_is_inverted_far_does_not_hold_up_all_else():
             found = untangle.untangle_whole(model, x, history, glide=False, hasty=True, soft=soft)
             left[soft] += found.left
     assert left[True] < 0.5 * left[False]
+
+
+@pytest.mark.parametrize(
+    ("alpha", "allowed", "softened"), [(0.125, True, 5), (0.13, True, 0), (0.125, False, 0)]
+)
+def test_steps_are_soft_only_where_the_first_four_are_short(alpha, allowed, softened):
+    """Soft ones leave single tets farther inverted than they had been: on walls what then is cured
+    by nothing, though steps are long without."""
+    newton = Dragging(500, alpha, worst=-400.0)
+    newton.set_targets = lambda _: None
+    model = SimpleNamespace(
+        options=VolumeOptions(untangle_iter=5), T=np.zeros((9000, 4), int),
+        newton=lambda *_, **__: newton, roomy_weights=None, roomy_volumes=None,
+    )  # fmt: skip
+    history = SimpleNamespace(budget=Budget(60.0), add=lambda *_, **__: None)
+    untangle.untangle_whole(model, np.zeros((1, 3)), history, glide=False, soft=allowed)
+    assert newton.soft == [0.0] * (4 if softened else 5) + [0.2] * softened
+    assert newton.epsilons[4] == (5.0 if softened else pytest.approx(0.81, abs=0.01))
 
 
 def test_patches_reach_past_no_vertex_that_does_not_move():
