@@ -42,7 +42,8 @@ _WIDEST, _WIDEST_SOFT, _NARROW = 1.0, 5.0, 0.1
 # Share of its determinant that the epsilon of an inverted tet is at least. With one epsilon for all
 # those inverted farthest have nearly all of the energy, and single ones hold up every step; with a
 # share of 1 the others' shapes outweigh them, and they stay where they are. Single ones do with any
-# share: it is for where so many first steps are no longer than `_SHORT` in the mean.
+# share: it is for where very many are inverted, or so many first steps are no longer than `_SHORT`
+# in the mean.
 _SOFT, _FIRST = 0.2, 4
 _LEAST = 1e-9
 _SETTLED = 0.1  # share of the energy; a step that lowers it by more is not done with its epsilon
@@ -197,9 +198,9 @@ def untangle_whole(
     hasty : bool
         Leave them all to the patches where steps stay short or cure single ones.
     soft : bool
-        Where the first steps are short, keep what is inverted far from holding up all else: long
-        steps that leave few inverted, but those farther than they were. With a boundary that does
-        not glide.
+        Where very many tets are inverted or the first steps are short, keep what is inverted far
+        from holding up all else: long steps that leave few inverted, but those farther than they
+        were. With a boundary that does not glide.
     """
     o = model.options
     newton = model.newton(x, glide=glide, weights=model.roomy_weights)
@@ -226,7 +227,7 @@ def untangle_whole(
 
     def held_up() -> bool:
         first = lengths[:_FIRST]
-        return soft and len(first) == _FIRST and sum(first) <= _FIRST * _SHORT
+        return len(first) == _FIRST and sum(first) <= _FIRST * _SHORT
 
     def follow(share: float, widest: float, ends: Callable[[], bool]) -> Untangled:
         return _continue(
@@ -244,8 +245,17 @@ def untangle_whole(
             note=note,
         )
 
-    done = follow(0.0, _WIDEST, held_up)
-    return follow(_SOFT, _WIDEST_SOFT, lambda: False) if held_up() else done
+    def never() -> bool:
+        return False
+
+    if not soft:
+        return follow(0.0, _WIDEST, never)
+    inverted = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, 0.0)).flips
+    if inverted <= MOST_STUCK * len(model.T):
+        done = follow(0.0, _WIDEST, held_up)
+        if not held_up():
+            return done
+    return follow(_SOFT, _WIDEST_SOFT, never)
 
 
 def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.intp]:

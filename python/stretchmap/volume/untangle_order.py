@@ -12,6 +12,7 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.budget import Budget
 from ..mesh.refinement import crowded_edges, surrounding_edges
 from .ground import untangle_on_mesh
 from .run import Run
@@ -44,6 +45,9 @@ _GLIDING, _WIDELY, _EARLY = 0.4, 0.15, 0.5
 # better spent on the others than on another start.
 _CURED, _GOING_ON = 0.5, 0.4
 _WORTH = 0.8  # share for patches in which all edges are halved: mostly those do
+# Times the time of all before it that halving edges may take where another start follows: that
+# serves as often, and where halving did it took at most a third.
+_HALVING = 0.5
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
@@ -121,7 +125,7 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
     """
     history = run.history
-    begin = run.x
+    begin, begun = run.x, run.budget.left
     if not run.resumed:  # else it has been at its end
         _bring_near(run)
         begin = run.x
@@ -140,9 +144,12 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     if glide and 0 < len(stuck) <= (_FEW_GLIDING if run.hasty else _FEW_STUCK):
         stuck = _patched_gliding(run, stuck)
     if cheap and 0 < len(stuck) <= _FEW_STUCK:
-        more = run.budget.share(_NEARLY)
-        history.budget = more if more.left > history.budget.left else history.budget
+        budget = max(run.budget.share(_NEARLY), history.budget, key=lambda each: each.left)
+        history.budget = budget
+        if run.hasty:
+            history.budget = Budget(min(_HALVING * (begun - run.budget.left), budget.left))
         stuck = _untangled_halved(run, stuck, glide=glide)
+        history.budget = budget
     early = run.budget.left > _EARLY * run.budget.seconds
     if run.hasty and early and glide and 0 < len(stuck) <= _FEW_STUCK:
         stuck = _patched_gliding(run, stuck, rings=_RINGS[-1:], share=_WIDELY)

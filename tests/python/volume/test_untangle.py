@@ -210,21 +210,28 @@ def test_what_is_inverted_far_does_not_hold_up_all_else():
 
 
 @pytest.mark.parametrize(
-    ("alpha", "allowed", "softened"), [(0.125, True, 5), (0.13, True, 0), (0.125, False, 0)]
-)
-def test_steps_are_soft_only_where_the_first_four_are_short(alpha, allowed, softened):
+    ("alpha", "n_tets", "allowed", "hard", "softened"),
+    [
+        (0.125, 10_000, True, 4, 5), (0.13, 10_000, True, 5, 0), (0.125, 10_000, False, 5, 0),
+        (1.0, 9_999, True, 0, 5), (1.0, 9_999, False, 5, 0),
+    ],
+)  # fmt: skip
+def test_steps_are_soft_only_where_many_are_inverted_or_the_first_are_short(
+    alpha, n_tets, allowed, hard, softened
+):
     """Soft ones leave single tets farther inverted than they had been: on walls what then is cured
     by nothing, though steps are long without."""
     newton = Dragging(500, alpha, worst=-400.0)
     newton.set_targets = lambda _: None
     model = SimpleNamespace(
-        options=VolumeOptions(untangle_iter=5), T=np.zeros((9000, 4), int),
+        options=VolumeOptions(untangle_iter=5), T=np.zeros((n_tets, 4), int),
         newton=lambda *_, **__: newton, roomy_weights=None, roomy_volumes=None,
     )  # fmt: skip
     history = SimpleNamespace(budget=Budget(60.0), add=lambda *_, **__: None)
     untangle.untangle_whole(model, np.zeros((1, 3)), history, glide=False, soft=allowed)
-    assert newton.soft == [0.0] * (4 if softened else 5) + [0.2] * softened
-    assert newton.epsilons[4] == (5.0 if softened else pytest.approx(0.81, abs=0.01))
+    assert newton.soft == [0.0] * hard + [0.2] * softened
+    assert newton.epsilons[0] == (1.0 if hard else 5.0)
+    assert newton.epsilons[hard:][:1] == [5.0] * (softened > 0)
 
 
 def test_patches_reach_past_no_vertex_that_does_not_move():

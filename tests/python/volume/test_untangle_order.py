@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
-from stretchmap.base.budget import Budget
+from stretchmap.base.budget import Budget, processor_seconds
 from stretchmap.volume import untangle
 from stretchmap.volume import untangle_order as order
 from stretchmap.volume.glide_relax import Relaxation
@@ -264,6 +264,34 @@ def test_what_patches_were_curing_when_time_was_up_is_gone_on_with(monkeypatch, 
     assert rounds == 1 or seconds[1] == pytest.approx(0.4 * run.budget.left, rel=0.1)
 
 
+@pytest.mark.parametrize("hasty", [True, False])
+def test_edges_are_halved_for_half_of_the_time_so_far_where_another_start_follows(
+    monkeypatch, hasty
+):
+    """Which takes as long and serves as often; what follows halving has all the time it had."""
+    run = run_of(sm.samples.bumpy_torus(600))
+    run.hasty, given = hasty, []
+    monkeypatch.setattr(order, "_inverted", lambda run: 0)
+    monkeypatch.setattr(order, "_patched", lambda *_, **__: np.arange(3))
+
+    def whole(model, x, *_, **__):
+        end = processor_seconds() + 0.1
+        while processor_seconds() < end:
+            pass
+        return Untangled(x, 3, -1.0)
+
+    def halved(run, stuck, *, glide):
+        given.append((run.history.budget.left, run.budget.seconds - run.budget.left))
+        return stuck[:0]
+
+    monkeypatch.setattr(order, "untangle_whole", whole)
+    monkeypatch.setattr(order, "_untangled_halved", halved)
+    order._untangle_inside(run, glide=False)
+    ((left, took),) = given
+    assert left == pytest.approx(0.5 * took if hasty else run.budget.seconds, rel=0.2)
+    assert run.history.budget.left > 0.8 * run.budget.seconds
+
+
 def test_single_elements_are_relaxed_on_a_torus():
     run = run_of(sm.samples.bumpy_torus(600))
     measures = np.linspace(-0.5, 0.5, 20_000)
@@ -275,6 +303,7 @@ def test_single_elements_are_relaxed_on_a_torus():
 def test_a_start_makes_room_for_the_next_where_tets_are_stuck(monkeypatch, stuck, hopeless):
     run = run_of(sm.samples.bumpy_torus(600))
     run.hasty, done = True, []
+    monkeypatch.setattr(order, "_HALVING", np.inf)  # nothing takes time here
 
     def whole(model, x, history, *, glide, thorough=False, hasty=False, soft=False):
         done.append("thorough" if thorough else "whole")
