@@ -37,8 +37,11 @@ __all__ = ["solve"]
 _log = logging.getLogger("stretchmap")
 
 # Mean abs(ratio - 1) from which on more vertices are worth their time, and how often; the tets they
-# are for have so many times the mean energy.
-_UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, 3.0
+# are for have so many times the mean energy, and so much of the mean volume.
+_UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, (3.0, 1.0)
+# Of coarse solids more and smaller tets get vertices where those do not lead to such a mean, as
+# long as there are no more tets than that, with so many for an edge.
+_BADLY, _MORE, _COARSE, _PER_EDGE = 0.06, ((1.0, 0.1), (0.3, 0.1)), 5000, 6
 _FINER = 0.7  # share of the time left that this may take
 _GAINED = 0.99  # of how uneven volumes were, at most: else the vertices are taken back
 
@@ -184,21 +187,25 @@ def _finer(run: Run, done: Minimized) -> Minimized:
     """
     o, history = run.options, run.history
     whole, history.budget = history.budget, history.budget.share(_FINER)
-    for _ in range(_FINER_ROUNDS):
-        run.x = done.x
-        before, edges = run.problem, _uneven_edges(run.problem)
-        if not len(edges) or history.budget.spent:
-            break
-        run.take(before.halved(edges))
-        more = minimize(
-            history.model, run.x, history, glide=True, start=o.volume_weight,
-            goal=o.volume_weight, leave=partial(_is_uneven, run.problem),
-        )  # fmt: skip
-        if not _unevenness(run.problem, more.x) < _GAINED * _unevenness(before, before.x):
-            run.take(before)
-            break
-        done = more
-        _log.info("volumes are kept badly: %d edges halved", len(edges))
+    for poor in (_POOR, *_MORE):
+        for _ in range(_FINER_ROUNDS):
+            run.x = done.x
+            before, edges = run.problem, _uneven_edges(run.problem, *poor)
+            if not len(edges) or history.budget.spent:
+                break
+            fine = before.solid.n_tets + _PER_EDGE * len(edges) > _COARSE
+            if poor is not _POOR and (fine or _mean_error(before, run.x) <= _BADLY):
+                break
+            run.take(before.halved(edges))
+            more = minimize(
+                history.model, run.x, history, glide=True, start=o.volume_weight,
+                goal=o.volume_weight, leave=partial(_is_uneven, run.problem),
+            )  # fmt: skip
+            if not _is_gain(before, run.problem, more.x):
+                run.take(before)
+                break
+            done = more
+            _log.info("volumes are kept badly: %d edges halved", len(edges))
     history.budget = whole
     if not done.converged:
         run.x = done.x
@@ -222,17 +229,40 @@ def _unevenness(problem: VolumeProblem, x: NDArray[np.float64]) -> float:
     return float(np.average(np.abs(ratios - 1.0), weights=volumes))
 
 
+def _mean_error(problem: VolumeProblem, x: NDArray[np.float64]) -> float:
+    """The same over the tets, whatever their volumes."""
+    return float(np.abs(_ratios(problem, x)[0] - 1.0).mean())
+
+
 def _is_uneven(problem: VolumeProblem, x: NDArray[np.float64]) -> bool:
-    return bool(np.abs(_ratios(problem, x)[0] - 1.0).mean() > _UNEVEN)
+    return _mean_error(problem, x) > _UNEVEN
 
 
-def _uneven_edges(problem: VolumeProblem) -> NDArray[np.int32]:
-    """The longest edges of the tets whose volume is kept worst; none if all keep it well enough."""
+def _is_gain(before: VolumeProblem, after: VolumeProblem, x: NDArray[np.float64]) -> bool:
+    """Whether volumes are more even, or those of small tets are at nearly no cost of the others."""
+    was, now = _unevenness(before, before.x), _unevenness(after, x)
+    if now < _GAINED * was:
+        return True
+    return _GAINED * now <= was and _mean_error(after, x) < _GAINED * _mean_error(before, before.x)
+
+
+def _uneven_edges(
+    problem: VolumeProblem, energies: float = _POOR[0], size: float = _POOR[1]
+) -> NDArray[np.int32]:
+    """The longest edges of the tets whose volume is kept worst; none if all keep it well enough.
+
+    Parameters
+    ----------
+    problem : VolumeProblem
+    energies, size : float
+        How many times the mean energy, and how much of the mean volume, these tets have at least.
+    """
     if not _is_uneven(problem, problem.x):
         return np.empty((0, 2), np.int32)
     ratios, volumes = _ratios(problem, problem.x)
     energy = 0.5 * (ratios + 1.0 / ratios) - 1.0
-    poor = (energy > _POOR * np.average(energy, weights=volumes)) & (volumes > volumes.mean())
+    mean = np.average(energy, weights=volumes)
+    poor = (energy > energies * mean) & (volumes > size * volumes.mean())
     return longest_inner_edges(problem.solid, problem.V, np.flatnonzero(poor))
 
 

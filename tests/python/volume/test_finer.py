@@ -34,6 +34,12 @@ def finer(solid):
     return sm.volume_map(solid)
 
 
+@pytest.fixture
+def not_coarse(monkeypatch):
+    """Small solids are refined as large ones are."""
+    monkeypatch.setattr(engine, "_COARSE", 0)
+
+
 def unevenness(result: sm.VolumeMap, solid: sm.TetMesh) -> float:
     """Mean abs(ratio - 1) of the input's tets."""
     volumes = _core.mesh.tet_volumes(result.image, result.mesh.T)
@@ -45,7 +51,7 @@ def mean_error(result: sm.VolumeMap) -> float:
     return float(np.abs(result.distortion.ratios - 1.0).mean())
 
 
-def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
+def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch, not_coarse):
     """The input's tets gain by a third or next to nothing, together a fifth; all tets of short
     plates a fifth, of long ones as often nothing, there being more small ones.
 
@@ -83,7 +89,28 @@ def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch):
     assert n_finer < 1.25 * n_coarse
 
 
-def test_rounds_go_on_while_volumes_are_kept_badly(monkeypatch):
+def drilled(half: float) -> sm.TetMesh:
+    """A block of 48 tets, 3 wide, with a square hole."""
+    cells = np.ones((3, 3, 1), bool)
+    cells[1, 1] = False
+    V, T = cut_cells(cells)
+    at = np.column_stack([np.interp(V[:, :2], range(4), [0, 1.5 - half, 1.5 + half, 3]), V[:, 2]])
+    return sm.TetMesh(at, T, orient=True)
+
+
+def test_coarse_solids_get_as_many_vertices_as_it_takes(monkeypatch):
+    """All tets about a small hole are small; what is large is too few to have any far above the
+    mean."""
+    solids = [drilled(half) for half in (0.1, 0.08, 0.05, 0.02, 0.01)]
+    maps = [sm.volume_map(each) for each in solids]
+    assert all(each.certificate.certified and each.converged for each in maps)
+    assert max(map(mean_error, maps)) < 0.075
+    assert max(each.mesh.n_tets for each in maps) <= engine._COARSE
+    monkeypatch.setattr(engine, "_MORE", ())
+    assert min(mean_error(sm.volume_map(each)) for each in solids) > 0.08
+
+
+def test_rounds_go_on_while_volumes_are_kept_badly(monkeypatch, not_coarse):
     solids = [plate(*shape) for shape in ((8, 3, 3), (9, 5, 3))]
     all_rounds = [sm.volume_map(each) for each in solids]
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 2)
@@ -93,7 +120,7 @@ def test_rounds_go_on_while_volumes_are_kept_badly(monkeypatch):
     assert left < 0.93 * before
 
 
-def test_vertices_come_once_steps_gain_little(monkeypatch):
+def test_vertices_come_once_steps_gain_little(monkeypatch, not_coarse):
     solids = [mug(5, 2, 5), plate(8, 3, 3), plate(9, 5, 3)]
     early = [sm.volume_map(each) for each in solids]
     monkeypatch.setattr(minimizing, "_LITTLE", -np.inf)  # once they gain nothing
