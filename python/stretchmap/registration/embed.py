@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..mesh.meshes import TetMesh
 from ..mesh.split_edges import SplitSolid
 from .flat_torus import FlatSurface
 from .overlay import Splits, overlay_splits
@@ -32,18 +31,41 @@ _NEAR, _SETTLE = 2, 10  # rings of vertices that make room for new ones, and how
 _MOST_ADDED = 0.5  # as a share of the boundary's vertices
 # Of an edge: its ends, and where it may be split.
 _SHARES = np.concatenate([[0.0], np.linspace(0.1, 0.9, 17), [1.0]])
+_LONGEST = 0.5  # turns: a point farther than half a turn from a face's center is taken for a copy
 
 
-def unfold_boundary(
-    source: TetMesh,
-    flat: FlatSurface,
-    bend: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-) -> tuple[SplitSolid, FlatSurface, NDArray[np.intp]]:
-    """Split boundary edges of the source until a map of the flat torus turns no face over.
+def split_long_edges(split: SplitSolid, flat: FlatSurface) -> tuple[SplitSolid, FlatSurface]:
+    """Halve boundary edges, where they are and in the flat torus, until none is longer there than
+    half a turn; the surface stays what it is.
 
     Parameters
     ----------
-    source : TetMesh
+    split : SplitSolid
+    flat : FlatSurface
+        Its boundary.
+    """
+    while True:
+        edges = flat.surface.edges
+        ways = flat.ways(edges)
+        lengths = np.abs(ways).max(axis=1)
+        order = np.argsort(-lengths, kind="stable")
+        bad = order[: np.count_nonzero(lengths > _LONGEST)]
+        if not len(bad):
+            return split, flat
+        middles = flat.turns[edges[bad, 0]] + 0.5 * ways[bad]
+        split, flat = _split(split, flat, (edges[bad], np.full(len(bad), 0.5), middles))
+
+
+def unfold_boundary(
+    split: SplitSolid,
+    flat: FlatSurface,
+    bend: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+) -> tuple[SplitSolid, FlatSurface, NDArray[np.intp]]:
+    """Split boundary edges of a solid until a map of the flat torus turns no face over.
+
+    Parameters
+    ----------
+    split : SplitSolid
     flat : FlatSurface
         Its boundary, free of folds.
     bend : callable
@@ -52,18 +74,17 @@ def unfold_boundary(
     Returns
     -------
     split : SplitSolid
-        The source, refined.
+        The solid, refined.
     bent : FlatSurface
         The boundary of that after the map.
     folded : ndarray of intp
         Faces that are still turned over.
     """
-    split = SplitSolid.of(source)
+    most_vertices = (1.0 + _MOST_ADDED) * len(flat.turns)
     for _ in range(_ROUNDS):
         bent = flat.at(bend(flat.turns))
         folded = np.flatnonzero(~(_core.area.turn_areas(bent.chart, bent.turns) > 0.0))
-        enough = len(flat.turns) > (1.0 + _MOST_ADDED) * source.surface.n_vertices
-        if enough or not len(folded):
+        if len(flat.turns) > most_vertices or not len(folded):
             break
         split, flat = _split(split, flat, _worst_edges(flat, folded, bend))
     return split, bent, folded

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.arrays import describe
 from ..base.rotation import kabsch
 from ..conformal.map import conformal_map
 from ..errors import SolverError
@@ -42,7 +43,7 @@ class FlatSurface:
     turns: NDArray[np.float64]
 
     @classmethod
-    def of(cls, surface: TriMesh) -> FlatSurface:
+    def of(cls, surface: TriMesh, name: str = "surface") -> FlatSurface:
         """Conformal map, stretch energy minimisation (Algorithm 4.1) in the flat torus, and Newton
         steps on the distortion of area and shape (``flat_value``).
 
@@ -52,8 +53,11 @@ class FlatSurface:
 
         Raises
         ------
-        MeshError, SolverError
+        MeshError
             As `conformal_map`.
+        SolverError
+            As there; or faces of the boundary of the solid that is called ``name`` are shrunk to
+            nothing, ``ids`` are those.
         """
         conformal = conformal_map(surface)
         chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
@@ -69,6 +73,13 @@ class FlatSurface:
                 best, turns = value, sem.turns.copy()
             sem.step()
         turns = _least_distorted(surface, chart, conformal.lattice, np.ascontiguousarray(turns))
+        lost = np.flatnonzero(~(_core.area.turn_areas(chart, turns) > 0.0))
+        if len(lost):
+            raise SolverError(
+                f"{describe('face', lost)} of the {name} lie so far out on a long, thin limb that "
+                "a flat torus shrinks them to nothing: cut the limb short or remesh it coarser",
+                lost,
+            )
         return cls(surface, conformal.forms, turns)
 
     def changed(self, gauge: Gauge) -> FlatSurface:

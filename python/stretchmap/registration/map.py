@@ -31,7 +31,7 @@ from ..volume.engine import solve
 from ..volume.options import FillOptions, check_prescribed
 from ..volume.problem import VolumeProblem
 from .affine import affine_landmark_map
-from .embed import EmbeddedBoundary, embed_boundary, unfold_boundary
+from .embed import EmbeddedBoundary, embed_boundary, split_long_edges, unfold_boundary
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
 from .match import match_surfaces
@@ -111,7 +111,8 @@ def register(
     OptionError
         An option out of range.
     SolverError
-        A numerical step broke down.
+        A numerical step broke down, or a flat torus shrinks faces far out on a limb to nothing;
+        ``ids`` are faces of that boundary.
 
     Notes
     -----
@@ -192,21 +193,25 @@ def _boundary_map(
     progress: Progress | None,
 ) -> tuple[EmbeddedBoundary, Gauge, tuple[IterationRecord, ...]]:
     """Points of the target surface for the boundary vertices of the source, refined if need be."""
-    first, second = FlatSurface.of(source.surface), FlatSurface.of(target.surface)
+    first, second = (
+        FlatSurface.of(solid.surface, name)
+        for solid, name in ((source, "source"), (target, "target"))
+    )
     pairs = np.stack(
         [source.boundary_index[marks.source], target.boundary_index[marks.target]], axis=1
     )
+    second = split_long_edges(SplitSolid.of(target), second)[1]
     gauge = choose_gauge(first, second, pairs)
-    first = first.changed(gauge)
+    split, first = split_long_edges(SplitSolid.of(source), first.changed(gauge))
     held = pairs if landmark_map == "smooth" else pairs[:0]
     match = match_surfaces(
         first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
     )
-    image, points, split = first.at(match.y), match.points, SplitSolid.of(source)
+    image, points = first.at(match.y), match.points
     if landmark_map == "affine":
         starts, ends = image.turns[pairs[:, 0]], second.turns[pairs[:, 1]]
         split, image, folded = unfold_boundary(
-            source, image, lambda at: affine_landmark_map(starts, ends, at)
+            split, image, lambda at: affine_landmark_map(starts, ends, at)
         )
         if len(folded):
             raise SolverError(

@@ -311,7 +311,7 @@ def test_faces_that_the_affine_map_turns_over_are_refined():
 
     faces = source.surface.F
     assert (flat_areas(shear(y), faces) <= 0.0).any()
-    split, bent, folded = unfold_boundary(source, flat, shear)
+    split, bent, folded = unfold_boundary(SplitSolid.of(source), flat, shear)
     solid = split.solid
     assert not len(folded) and (flat_areas(bent.turns, solid.surface.F) > 0.0).all()
     assert np.array_equal(bent.turns[: len(y)], shear(y))
