@@ -20,15 +20,14 @@ def cut_exactly(
     pieces: Pieces,
     ladder: Ladder,
     chosen: NDArray[np.bool_],
-    targets: NDArray[np.float64] | None,
+    asked: NDArray[np.float64] | None,
 ) -> tuple[Pieces, NDArray[np.intp], NDArray[np.intp]]:
-    """The chosen tets cut along levels with the volumes asked for below them.
+    """The chosen tets cut along levels into parts of the volumes asked for.
 
     Parameters
     ----------
-    targets : ndarray or None
-        Chosen volume below each level, for angles but the first. None: the levels as they are,
-        through no vertex that they do not meet.
+    asked : ndarray or None
+        Volume of each part. None: the levels as they are, through no vertex that they do not meet.
 
     Returns
     -------
@@ -40,13 +39,13 @@ def cut_exactly(
     """
     count, points = len(ladder.levels), len(pieces.points)
     detours = Detours.none(points)
-    if targets is None:
+    if asked is None:
         slabs = Slabs(pieces, ladder, chosen, np.full(count, 1e-9), detours)
         return slabs.pieces(np.zeros(count)), slabs.origin, slabs.labels
     step, tries = np.zeros(count, int), np.zeros(count, int)
     while True:
         slabs = Slabs(pieces, ladder, chosen, _SNAP[step], detours)
-        tilts, missing, crowded = slabs.tilts(targets)
+        tilts, missing, crowded = slabs.tilts(asked)
         failed = (missing != 0.0) | crowded
         if not failed.any() or (step[failed] == len(_SNAP) - 1).all():
             return slabs.pieces(tilts), slabs.origin, slabs.labels
@@ -60,5 +59,5 @@ def cut_exactly(
             else:
                 tries[level] += 1
                 detours.level[found[0]], detours.values[found[0]] = level, found[1]
-        if len(targets) < count:  # volumes are counted from the first level
+        if len(asked) == count:  # volumes are counted from the first level
             step[0] = step[failed].max()

@@ -124,7 +124,7 @@ def _root(below: Callable[[float], float], target: float, ends: tuple[float, flo
     return float(brentq(excess, *ends, xtol=1e-15, rtol=4 * np.finfo(float).eps))
 
 
-# Levels, and the volumes below them as `cut_exactly` takes them.
+# Levels, and the volumes of the parts between them as `cut_exactly` takes them.
 Levels = tuple[NDArray[np.float64], NDArray[np.float64] | None]
 
 
@@ -141,7 +141,7 @@ def cut_nested(
     ----------
     rule : callable
         ``rule(i, cell, inside)`` returns the levels of the i-th coordinate in a cell of those
-        before it, and the volumes below them.
+        before it, and the volumes of the parts there.
 
     Returns
     -------
@@ -158,9 +158,9 @@ def cut_nested(
         labels = labels * count
         for place, cell in enumerate(np.ndindex(*before)):
             chosen = labels == place * count
-            here, targets = rule(i, cell, pieces.only(chosen))
+            here, asked = rule(i, cell, pieces.only(chosen))
             ladder = Ladder(Heights.of(pieces.points, axis, start), here)
-            pieces, origin, parts = cut_exactly(pieces, ladder, chosen, targets)
+            pieces, origin, parts = cut_exactly(pieces, ladder, chosen, asked)
             labels = labels[origin] + np.maximum(parts, 0)
             cuts.append(here + (0.0 if axis == "s" else start))
         levels.append(np.array(cuts).reshape(*before, -1))

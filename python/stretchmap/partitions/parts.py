@@ -282,11 +282,10 @@ def partition(
     def as_asked(i: int, cell: tuple[int, ...], inside: Pieces) -> Levels:
         here = levels_of(inside, axes[i], shares[i], start, "source")
         share = math.prod(shares[j][part] for j, part in enumerate(cell))
-        return here, share * total * np.cumsum(shares[i])[:-1]
+        return here, share * total * shares[i]
 
     def as_found(i: int, cell: tuple[int, ...], inside: Pieces) -> Levels:
-        parts = raw.reshape(counts)[cell].reshape(counts[i], -1).sum(axis=1)
-        return same[i], np.cumsum(parts)[:-1]
+        return same[i], raw.reshape(counts)[cell].reshape(counts[i], -1).sum(axis=1)
 
     total = float(pieces.volumes("source").sum())
     cut, labels, levels = cut_nested(pieces, axes, counts, start, as_asked if correct else as_found)

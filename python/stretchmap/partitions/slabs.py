@@ -95,8 +95,13 @@ class Slabs:
         points = np.concatenate([before.points, added])
         return Pieces(points, self._T, before.parent[self.origin], before.center)
 
-    def tilts(self, targets: Reals) -> tuple[Reals, Reals, NDArray[np.bool_]]:
-        """Tilt of each level that has the chosen volume below it as asked.
+    def tilts(self, asked: Reals) -> tuple[Reals, Reals, NDArray[np.bool_]]:
+        """Tilt of each level that gives the parts their volumes.
+
+        Parameters
+        ----------
+        asked : ndarray, shape (p,)
+            Chosen volume of each part.
 
         Returns
         -------
@@ -108,7 +113,7 @@ class Slabs:
         """
         count = len(self._ladder.levels)
         tilts, left, slopes = np.zeros(count), np.zeros(count), np.full(count, -np.inf)
-        first = count - len(targets)
+        first = count - len(asked) + 1
 
         def set_tilt(level: int, missing: float) -> None:
             moved = self._moved(level)
@@ -124,19 +129,18 @@ class Slabs:
         if first:  # where the first part begins, as much before it as there was, if that can be
             set_tilt(0, self._drawn(0))
             left[0] = 0.0
-        for level, missing in enumerate(targets - self._below(tilts, len(targets)), first):
+        for level, missing in enumerate(self._missing(tilts, asked), first):
             set_tilt(level, float(missing))
         if not left.any():
-            tilts = self._polished(tilts, slopes, targets)
+            tilts = self._polished(tilts, slopes, asked)
         return tilts, left, self._crowded(tilts)
 
-    def _polished(self, tilts: Reals, slopes: Reals, targets: Reals) -> Reals:
+    def _polished(self, tilts: Reals, slopes: Reals, asked: Reals) -> Reals:
         """Tilts that agree with the tets as they are, whose rounding is more in thin parts."""
-        count, first = len(targets), len(tilts) - len(targets)
-        asked = np.diff(targets, prepend=0.0, append=float(self.volumes.sum()))
+        first = len(tilts) - len(asked) + 1
         best, least = tilts, np.inf
         for _ in range(_POLISH):
-            missing = targets - self._below(tilts, count)
+            missing = self._missing(tilts, asked)
             worst = np.abs(np.diff(missing, prepend=0.0, append=0.0) / asked).max()
             if worst < least:
                 best, least = tilts, worst
@@ -146,12 +150,17 @@ class Slabs:
             tilts[first:] += missing / slopes[first:]
         return best
 
-    def _below(self, tilts: Reals, count: int) -> Reals:
-        """Chosen volume below each of the last levels, so many."""
+    def _missing(self, tilts: Reals, asked: Reals) -> Reals:
+        """Chosen volume that the parts below each level between two of them lack together.
+
+        Summed up is what each lacks and not how large it is, and what all of them lack, which no
+        level makes up for, is divided among them: else the last has the rounding of the whole, more
+        than it may be of one part of hundreds.
+        """
         inside = self.labels >= 0
         volumes = self.pieces(tilts).only(inside).volumes("source")
-        parts = volumes_of_parts(self.labels[inside], volumes, count + 1)
-        return np.cumsum(parts)[:count]
+        lacking = asked - volumes_of_parts(self.labels[inside], volumes, len(asked))
+        return np.cumsum(lacking - asked * (lacking.sum() / asked.sum()))[:-1]
 
     def _moved(self, level: int) -> Callable[[float], float]:
         """How much the chosen volume below a level grows by a tilt."""

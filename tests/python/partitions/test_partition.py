@@ -208,6 +208,11 @@ def test_thin_parts_lose_nothing_to_the_sums_of_others(rough_map):
     assert np.abs(parts.errors).max() < 1e-12
 
 
+def test_the_last_of_hundreds_of_parts_has_no_more_than_its_own_rounding(rough_map):
+    parts = partition(rough_map, 500, "u")
+    assert np.abs(parts.errors).max() < 1e-13
+
+
 def test_an_interface_is_between_two_parts(coarse_map):
     parts = partition(coarse_map, 3)
     with pytest.raises(OptionError, match="twice"):
