@@ -92,8 +92,9 @@ def hex_mesh(
     CertificationError
         If tets of the image are folded or flat; ``ids`` are these.
     SolverError
-        If the core of the torus lies outside the image, the layers do not fit, or hexahedra are
-        left that could not be made valid; then ``ids`` are those.
+        If the core of the torus lies outside the image, whose flat faces lie far below the torus
+        where the boundary is coarse (``ids`` are their tets), the layers do not fit, or hexahedra
+        are left that could not be made valid; then ``ids`` are those.
 
     Notes
     -----

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import describe
 from ..base.progress import Progress
 from ..base.torus import Torus
 from ..errors import SolverError
-from ..maps.given import torus_of
+from ..maps.given import as_map_of_solid, torus_of
 from .layout import Layout, swept_layout
 from .optimize import GridOptimizer
 from .quality import MOST_MISSED, boundary_distances, boundary_quads, missed_volume
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 __all__ = ["TRIAL", "Start", "best_starts", "equal_axes", "pulled_back"]
 
 _BISECTIONS = 40
+_ON_TORUS = 1e-6  # of its radius, how far vertices of the boundary may be off
+_DEEP = 0.1  # of its radius, below the torus: faces to be named where the core is outside
 _KEPT = 2  # after the first rounds: which of them ends closer is not known yet
 TRIAL = Schedule(even=tuple(np.geomspace(0.003, 1.0, 16)), powers=(1.0,) * 2 + (2.0,) * 2)
 
@@ -108,6 +111,9 @@ def pulled_back(result: MapResult, numbers: Sequence[int] | NDArray[np.int_]) ->
     sections, block, rings = (int(k) for k in numbers)
     layout = swept_layout(sections, block, rings)
     torus, points = torus_of(result), result.point_map
+    core = torus.xi(layout.u, layout.v, np.zeros(len(layout.u)))
+    if not points.inverse(core).inside.all():
+        raise _core_outside(result, torus)
     grid = torus.xi(layout.u, layout.v, layout.share * _reach(points, torus, layout.u, layout.v))
     located = points.inverse(grid)
     lost = np.flatnonzero(~located.inside)
@@ -121,10 +127,31 @@ def _reach(
 ) -> NDArray[np.float64]:
     """Largest s, up to r, for which xi(u, v, s) lies in the image; by bisection."""
     low, high = np.zeros(len(u)), np.full(len(u), torus.r)
-    if not points.inverse(torus.xi(u, v, low)).inside.all():
-        raise SolverError("the core of the torus lies outside the image; is the map certified?")
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         inside = points.inverse(torus.xi(u, v, middle)).inside
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     return low
+
+
+def _core_outside(result: MapResult, torus: Torus) -> SolverError:
+    """What keeps the core of the torus, which rays start from, outside the image.
+
+    Vertices of the boundary lie on the torus, flat faces between them below it.
+    """
+    _, solid = as_map_of_solid(result, "a grid of hexahedra")
+    corners = result.image[solid.boundary_vertices][solid.surface.F]  # (m, 3, 3)
+    off = float(np.abs(torus.coordinates(corners.reshape(-1, 3))[2] / torus.r - 1.0).max())
+    if off > _ON_TORUS:
+        return SolverError(
+            f"the core of the torus lies outside the image, whose boundary is up to {off:.2g} r "
+            "off the torus; a grid needs the torus that the map goes to"
+        )
+    below = 1.0 - torus.coordinates(corners.mean(axis=1))[2] / torus.r
+    deep = np.unique(solid.boundary_tets[below >= min(_DEEP, below.max())])
+    return SolverError(
+        f"the core of the torus lies outside the image: its boundary is too coarse at "
+        f"{describe('tet', deep)}, whose flat faces lie up to {below.max():.2g} r below the torus; "
+        "mesh the boundary finer and more evenly, as prepare() does, and map the solid again",
+        deep,
+    )

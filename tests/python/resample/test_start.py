@@ -187,3 +187,24 @@ def test_candidates_have_about_as_many_hexahedra_as_asked_for():
                 count = sections * block * (block + 4 * rings)
                 assert min(block, rings) >= 1 and sections >= 4
                 assert sections == 4 or abs(count / wanted - 1.0) < 0.15
+
+
+def test_a_core_outside_the_image_is_laid_to_what_keeps_it_there():
+    """Three sections: a flat face between two of them lies deeper than the core."""
+    rim = np.arange(4) * np.pi / 2.0
+    u, v = np.meshgrid(np.arange(3) * 2.0 * np.pi / 3.0, rim, indexing="ij")
+    torus = sm.Torus(3.0, 1.0)
+    V = torus.xi(u.ravel(), v.ravel(), np.ones(12))
+    tets = []
+    for section in range(3):
+        here, there = 4 * section, 4 * ((section + 1) % 3)
+        for a, b, c in ((0, 1, 2), (0, 2, 3)):
+            prism = [here + a, here + b, here + c, there + a, there + b, there + c]
+            tets += [[prism[i] for i in tet] for tet in ((0, 1, 2, 5), (0, 1, 4, 5), (0, 3, 4, 5))]
+    solid = sm.TetMesh(V, tets, orient=True)
+    with pytest.raises(SolverError, match="boundary is too coarse at .* below the torus") as e:
+        sm.hex_mesh(a_map(solid, V, torus), n_hexahedra=100)
+    assert len(e.value.ids)
+    fine, given = a_ring()
+    with pytest.raises(SolverError, match="off the torus; a grid needs the torus that the map"):
+        sm.hex_mesh(a_map(given, fine.image, sm.Torus(4.5, 1.0)), n_hexahedra=100)
