@@ -26,7 +26,7 @@ Fields = dict[str, NDArray[Any]]
 OF_MAPS = frozenset(
     "V F T image angles torus meta target_V target_T ratio ratios ring_ratio ring_ratios file "
     "parent_tet parent_face landmarks forms u v s cos_u sin_u cos_v sin_v grad_u grad_v grad_s "
-    "along around radial seam_u seam_v".split()
+    "along around radial seam_u seam_v converged".split()
 )
 
 

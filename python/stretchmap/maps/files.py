@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
+import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import as_points, as_reals
@@ -84,7 +87,7 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
     path : path-like
         An ``.npz`` with ``V (n, 3)``, ``F`` or ``T``, and ``image (n, 3)``; or ``.vtu``, ``.vtk``
         or ``.xdmf`` with point data ``image`` and, where it is a map to a torus, ``torus``. Those
-        hold no history.
+        say whether it converged, and hold no history, stop reason or seconds.
 
     Returns
     -------
@@ -149,7 +152,7 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
         meta=meta,
         history=history,
         converged=meta.get("converged", False),
-        stop_reason=meta.get("stop_reason", "read from a file"),
+        stop_reason=meta.get("stop_reason", "the file does not say"),
         seconds=meta.get("seconds", {}),
         point_fields=points,
         cell_fields=cells,
@@ -158,6 +161,11 @@ def load_map(path: str | os.PathLike[str]) -> LoadedMap:
 
 def _of_archive(path: Path) -> dict[str, NDArray[Any]]:
     with open_to_read(path) as file, parsing(path):
+        if path.suffix.lower() != ".npz" and not zipfile.is_zipfile(file):
+            raise FileFormatError(
+                f"it is no .npz archive, and of other files only {', '.join(_VIEWERS)} hold both "
+                "ends of a map; save it as one of these"
+            )
         return read_archive(file)
 
 
@@ -176,6 +184,8 @@ def _of_viewer(path: Path) -> dict[str, NDArray[Any]]:
                     with parsing(path):
                         raise FileFormatError("the radii of the torus differ from row to row")
                 arrays[name] = array[0, :2]
+            elif name == "converged":
+                arrays["meta"] = np.array(json.dumps({name: bool(array.all())}))
             elif name not in OF_MAPS:
                 arrays[prefix + name] = array
     return arrays

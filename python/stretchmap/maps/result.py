@@ -217,7 +217,8 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
         ----------
         path : path-like
             ``.npz``: everything, for :func:`load_map`. ``.vtu``, ``.vtk``, ``.xdmf``: the source
-            mesh; as point data ``image``, ``ring_ratio`` and, on a torus, ``u``, ``v``, ``s`` with
+            mesh; as point data ``image``, ``ring_ratio``, ``converged`` (0 or 1 in every row) and,
+            on a torus, ``u``, ``v``, ``s`` with
             ``cos_u``, ``sin_u``, ``cos_v``, ``sin_v``, which have no seam where the angles start
             anew, and ``torus`` (R and r in every row); as cell data ``ratio``, of a refined mesh
             ``parent_tet`` or ``parent_face``, and of a solid on a torus the gradients and frames of
@@ -248,6 +249,11 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
     def as_cells(self) -> Cells:
         """The source with all fields of the map, as viewers and solvers take them."""
         d = self.distortion
-        points = {"image": self.image, "ring_ratio": d.ring_ratios, **self.point_fields}
+        points: dict[str, NDArray[Any]] = {
+            "image": self.image,
+            "ring_ratio": d.ring_ratios,
+            "converged": np.full(len(self.mesh.V), self.converged, np.int32),
+            **self.point_fields,
+        }
         cells = {"ratio": d.ratios, **self.cell_fields}
         return all_fields(self.mesh, self.torus, points, cells, self.extra_arrays())

@@ -1,5 +1,6 @@
 """Map files, reports and records: what goes in comes out, and a failure leaves nothing behind."""
 
+import dataclasses
 import json
 import math
 import os
@@ -155,6 +156,23 @@ def test_solid_as_unstructured_grid(solid_map, tmp_path, suffix):
     np.testing.assert_allclose(grid.point_data["image"], solid_map.image)
     np.testing.assert_allclose(grid.cell_data["ratio"][0], solid_map.distortion.ratios)
     np.testing.assert_allclose(grid.points, solid_map.mesh.V)
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk"])
+@pytest.mark.parametrize("converged", [True, False])
+def test_files_for_viewers_keep_whether_the_map_converged(solid_map, tmp_path, suffix, converged):
+    pytest.importorskip("meshio")
+    dataclasses.replace(solid_map, converged=converged).save(tmp_path / f"map{suffix}")
+    back = load_map(tmp_path / f"map{suffix}")
+    assert back.converged is converged and back.stop_reason == "the file does not say"
+    assert "converged" not in back.point_fields
+
+
+def test_a_file_with_one_end_of_a_map_is_refused_by_what_holds_both(solid_map, tmp_path):
+    pytest.importorskip("meshio")
+    solid_map.save(tmp_path / "map.msh")
+    with pytest.raises(FileFormatError, match=r"no \.npz archive, and .*\.vtu, \.vtk, \.xdmf hold"):
+        load_map(tmp_path / "map.msh")
 
 
 def test_solid_in_a_surface_format_is_the_boundary_of_the_image(solid_map, tmp_path):
