@@ -21,6 +21,8 @@ from .problem import Outcome
 
 __all__ = ["VolumeMap", "volume_result"]
 
+_LEAST = 1e-12  # volume of an image; those of sound ones are near 1
+
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class VolumeMap(MapResult):
@@ -102,7 +104,8 @@ def volume_result(outcome: Outcome, method: str, boundary: str, start: MapResult
     problem, refinement = outcome.problem, outcome.problem.refinement
     assert problem.torus is not None
     volume = float(_core.mesh.tet_volumes(problem.x, problem.solid.T).sum())
-    scale = (problem.solid.volume / volume) ** (1.0 / 3.0)
+    # Of what has been folded until it is inside out as a whole, the certificate says that it is.
+    scale = (problem.solid.volume / max(abs(volume), _LEAST)) ** (1.0 / 3.0)
     image, torus = problem.x * scale, problem.torus.scaled(scale)
     clock = time.perf_counter()
     certificate = certify(problem.solid, image, torus)

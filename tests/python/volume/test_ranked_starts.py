@@ -11,10 +11,11 @@ import pytest
 
 import stretchmap as sm
 from shapes import mug
+from stretchmap import _core
 from stretchmap.area import balance, route
 from stretchmap.area.balance import balance_areas
 from stretchmap.base.budget import Budget
-from stretchmap.errors import SolverError
+from stretchmap.errors import CertificationError, SolverError
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import certified
 from stretchmap.volume import ranked_starts as module
@@ -197,6 +198,20 @@ def test_no_start_is_made_with_hardly_any_time_left(monkeypatch, plain, left, tr
     monkeypatch.setattr(Budget, "of", lambda *_: Nearly(100.0))
     assert not sm.volume_map(SOLID, keep_best=True).certificate.certified
     assert len(begun) == tried
+
+
+def test_what_ends_inside_out_as_a_whole_is_not_certified(monkeypatch, plain):
+    def turned(problem, *_, **__):
+        volume = _core.mesh.tet_volumes(problem.x, problem.solid.T).sum()
+        folded = dataclasses.replace(problem, x=problem.x * (1.0, 1.0, -np.sign(volume)))
+        return Outcome(folded, (), False, "no", {"start": 0.0})
+
+    monkeypatch.setattr(module, "boundary_starts", lambda *_, **__: iter([plain]))
+    monkeypatch.setattr(certified, "solve", turned)
+    found = sm.volume_map(SOLID, keep_best=True)
+    assert not found.certificate.certified and np.isfinite(found.image).all()
+    with pytest.raises(CertificationError):
+        sm.volume_map(SOLID)
 
 
 def test_exact_areas_come_first_where_the_boundary_is_held(monkeypatch, plain):
