@@ -26,7 +26,10 @@ def _none(*shape: int) -> Ids:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis(HasSummary):
-    """Every defect of a mesh. ``defects`` lists those found, ``summary()`` puts them into words.
+    """Every defect of the elements. ``defects`` lists those found, ``summary()`` words them.
+
+    Not looked for are faces that cross, in a surface or in the boundary of a solid: these are
+    `TriMesh.crossing_faces`.
 
     Elements are faces of a surface and tets of a solid. Elements that repeat a vertex and second
     copies are reported and then left out of all else, so that one fault is listed once.
@@ -75,6 +78,8 @@ class Diagnosis(HasSummary):
     coincident : (a,) ndarray of int32
         Vertices exactly where one of a lower id is, which have to be welded if they are meant to be
         one. Looked for only where there are several components or the genus is not 1.
+    welding_helps : bool
+        Edges or vertices that are not manifold would be with these welded.
 
     Examples
     --------
@@ -108,6 +113,7 @@ class Diagnosis(HasSummary):
     border_edges: Ids = field(default_factory=lambda: _none(0, 2))
     cavity_vertices: Ids = field(default_factory=lambda: _none(0))
     coincident: Ids = field(default_factory=lambda: _none(0))
+    welding_helps: bool = False
 
     def __repr__(self) -> str:
         found = _count(len(self.defects), "defect") if self.defects else "no defects"
@@ -223,6 +229,9 @@ class Diagnosis(HasSummary):
                 defect = wording.defect(ids)
                 if wording.name == "border_edges":
                     defect = replace(defect, message=defect.message + self._welding())
+                elif wording.name.startswith("nonmanifold") and self.welding_helps:
+                    fault = defect.message.partition("; ")[0]
+                    defect = replace(defect, message=fault + self._welding())
                 yield defect
         if self.n_components > 1:
             yield self._disconnected()
@@ -253,7 +262,7 @@ def diagnose_surface(V: NDArray[np.float64], F: NDArray[np.int32]) -> Diagnosis:
         genus=found.genus,
         **_common(found),
     )
-    return _with_coincident(diagnosis, V)
+    return _with_coincident(diagnosis, V, F)
 
 
 def diagnose_solid(V: NDArray[np.float64], T: NDArray[np.int32]) -> Diagnosis:
@@ -271,10 +280,10 @@ def diagnose_solid(V: NDArray[np.float64], T: NDArray[np.int32]) -> Diagnosis:
         cavity_vertices=read_only(np.unique(found.boundary_faces[cavity])),
         **_common(found),
     )
-    return _with_coincident(diagnosis, V)
+    return _with_coincident(diagnosis, V, T)
 
 
-def _common(found: _core.mesh.SurfaceDiagnosis | _core.mesh.SolidDiagnosis) -> dict[str, Ids]:
+def _common(found: _core.mesh.SurfaceDiagnosis | _core.mesh.SolidDiagnosis) -> dict[str, Any]:
     return {
         "repeated": found.repeated,
         "duplicates": found.duplicates,
@@ -289,13 +298,27 @@ def _common(found: _core.mesh.SurfaceDiagnosis | _core.mesh.SolidDiagnosis) -> d
     }
 
 
-def _with_coincident(found: Diagnosis, V: NDArray[np.float64]) -> Diagnosis:
+def _with_coincident(found: Diagnosis, V: NDArray[np.float64], elements: Ids) -> Diagnosis:
     if found.n_components == 1 and found.genus.tolist() == [1]:
         return found
     order = np.lexsort(V.T)
     same = (V[order[1:]] == V[order[:-1]]).all(axis=1)
     ids = np.sort(order[1:][same]).astype(np.int32)
-    return replace(found, coincident=read_only(ids))
+    helps = False
+    if len(ids) and _not_manifold(found):
+        first = np.empty(len(V), np.int32)  # of all that are where each is, the lowest
+        first[order] = order[np.maximum.accumulate(np.where(np.r_[True, ~same], range(len(V)), 0))]
+        solid = found.kind == "solid"
+        core = _core.mesh.SolidDiagnosis if solid else _core.mesh.SurfaceDiagnosis
+        helps = _not_manifold(core(V, first[elements])) < _not_manifold(found)
+    return replace(found, coincident=read_only(ids), welding_helps=helps)
+
+
+def _not_manifold(
+    found: Diagnosis | _core.mesh.SurfaceDiagnosis | _core.mesh.SolidDiagnosis,
+) -> int:
+    """Number of edges and vertices that are not manifold."""
+    return len(found.nonmanifold_edges) + len(found.nonmanifold_vertices)
 
 
 def _listed(numbers: NDArray[Any]) -> str:

@@ -142,7 +142,7 @@ class TetMesh(Mesh):
         return Cells(self.V, "tetra", self.T)
 
     def diagnose(self) -> Diagnosis:
-        """List every defect with its ids.
+        """List every defect with its ids; faces that cross are `TriMesh.crossing_faces`.
 
         Returns
         -------

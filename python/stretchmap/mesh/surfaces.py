@@ -174,7 +174,7 @@ class TriMesh(Mesh):
         return Cells(self.V, "triangle", self.F)
 
     def diagnose(self) -> Diagnosis:
-        """List every defect with its ids.
+        """List every defect with its ids; faces that cross are `crossing_faces`.
 
         Returns
         -------

@@ -16,6 +16,7 @@ from stretchmap.errors import (
     GenusError,
     IndexRangeError,
     MeshError,
+    NonManifoldError,
     OpenSurfaceError,
     OrientationError,
 )
@@ -390,6 +391,27 @@ def test_meshes_on_disk_have_no_defects(name, load_solid):
     solid.require_solid_torus()
     solid.surface.require_genus_one()
     assert solid.surface.volume == pytest.approx(solid.volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("tet", [0, 5])
+def test_a_vertex_given_twice_is_to_be_welded_and_not_its_neighbors_parted(tet):
+    solid = samples.solid_torus(600)
+    T = solid.T.copy()
+    V = np.vstack([solid.V, solid.V[T[tet, :1]]])
+    T[tet, 0] = solid.n_vertices
+    message = f"faces; vertex {solid.n_vertices} exactly where others are: weld them first"
+    with pytest.raises(NonManifoldError, match=message):
+        TetMesh(V, T).require_solid_torus()
+
+
+def test_sheets_that_welding_does_not_part_are_to_be_parted():
+    """Two cubes meet in an edge; a third one has a corner where another has one."""
+    V, T = shapes.cubes(np.eye(2, dtype=bool)[..., None])
+    W, U = shapes.cubes(shapes.BALL)
+    found = TetMesh(
+        np.vstack([V, W + np.array([2.0, 2.0, 1.0])]), np.vstack([T, U + len(V)])
+    ).diagnose()
+    assert len(found.coincident) == 1 and "separate the sheets" in found.defects[0].message
 
 
 def test_vertices_that_should_be_welded_are_named():
