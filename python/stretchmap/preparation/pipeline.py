@@ -73,7 +73,7 @@ def prepare(
     ----------
     surface : TriMesh, or (a, b, c) array of bool or integers
         Any triangles, whatever their defects; or a mask, of which what is not zero belongs to the
-        solid.
+        solid. Holes through it may be one voxel wide where they are wanted.
     faces : int
         Number of boundary faces aimed at.
     genus : int
@@ -141,7 +141,7 @@ def prepare(
             raise OptionError("spacing is part of the affine; pass one of the two")
     run = _Run(progress, chosen_filler(filler), filler == "auto" and has_ftetwild())
     if isinstance(surface, np.ndarray):
-        V, F = run.arrays("mask", mask_surface, surface, matrix)
+        V, F = run.arrays("mask", mask_surface, surface, matrix, genus)
     else:
         raw = as_surface(surface)
         if affine is not None or (steps != 1.0).any():

@@ -11,16 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..base.arrays import as_reals
 from ..base.files import open_to_read, parsing
-from ..base.options import as_path
-from ..errors import ArrayError, FileFormatError, MeshError, MissingDependencyError
+from ..base.options import as_path, memory
+from ..errors import ArrayError, FileFormatError, GenusError, MeshError, MissingDependencyError
 from ..io.npz import read_archive, read_array
 
 __all__ = ["as_affine", "holds_mask", "mask_surface", "read_mask"]
 
 _BLUR = 0.7  # voxels; takes the stairs off, moves a flat surface nowhere
+_BYTES_PER_HALVED = 8 * 12  # a voxel's eight parts, smoothed in single precision
 _FLAT = 1e-6  # volume of a voxel over the product of its sides
 
 
@@ -55,7 +58,7 @@ def as_affine(affine: ArrayLike, name: str = "affine") -> NDArray[np.float64]:
 
 
 def mask_surface(
-    mask: NDArray[Any], affine: NDArray[np.float64]
+    mask: NDArray[Any], affine: NDArray[np.float64], genus: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], dict[str, int]]:
     """Surface of the largest island of a mask, its cavities filled.
 
@@ -64,18 +67,25 @@ def mask_surface(
     mask : (a, b, c) array of bool, or of integers of which those that are not zero belong to it
     affine : (4, 4) array
         The center of voxel (i, j, k) lies at ``affine @ (i, j, k, 1)``; regular.
+    genus : int
+        Number of handles that are wanted. Where the mask has as many and smoothing closes some,
+        as it does holes one voxel wide, voxels are halved first.
 
     Returns
     -------
     V, F : ndarrays
         Marching cubes on the smoothed mask; all faces oriented alike, either way.
     counts : dict
-        Voxels of ``islands`` dropped, of ``cavities`` filled, ``faces``.
+        Voxels of islands dropped and of cavities filled, faces, and whether voxels were halved.
 
     Raises
     ------
     ArrayError
         Not such a mask, or an empty one.
+    OptionError
+        Voxels would have to be halved, which takes more memory than there is.
+    GenusError
+        The mask has the handles that are wanted, and smoothing closes some of them all the same.
     MissingDependencyError
         If scikit-image is not installed.
     """
@@ -89,7 +99,6 @@ def mask_surface(
         raise ArrayError("the mask is empty")
     if importlib.util.find_spec("skimage") is None:
         raise MissingDependencyError("a mask needs scikit-image: pip install 'stretchmap[prepare]'")
-    from skimage.measure import marching_cubes
 
     box = ndimage.find_objects((mask != 0).astype(np.uint8))[0]
     inside = np.pad(mask[box] != 0, 3)
@@ -97,17 +106,55 @@ def mask_surface(
     sizes = np.bincount(labels.ravel())[1:]
     body = labels == sizes.argmax() + 1
     filled = ndimage.binary_fill_holes(body)
-    field = ndimage.gaussian_filter(filled.astype(np.float32), _BLUR)
-    if not field.max() > 0.5:
-        raise ArrayError("the mask is nowhere thicker than a voxel; resample it finer")
-    V, F, _, _ = marching_cubes(field, 0.5)
+    V, F = _polygonized(filled)
+    halved = _handles(V, F) < genus <= _tunnels(filled)
+    if halved:
+        memory("the mask with its voxels halved", _BYTES_PER_HALVED * filled.size)
+        V, F = _polygonized(filled.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2))
+        V = 0.5 * V - 0.25
+        if (found := _handles(V, F)) < genus:
+            raise GenusError(
+                f"the mask has genus {_tunnels(filled)}, its smoothed surface {found}, {genus} is "
+                "wanted: voxels of a hole share edges or corners only, no faces; widen it there, "
+                "or segment a finer image"
+            )
     counts = {
         "island_voxels_dropped": int(sizes.sum() - sizes.max()),
         "cavity_voxels_filled": int(filled.sum() - sizes.max()),
         "faces": len(F),
     }
+    if halved:
+        counts["voxels_halved"] = 1
     V = V + np.array([axis.start for axis in box]) - 3
-    return V @ affine[:3, :3].T + affine[:3, 3], np.ascontiguousarray(F, np.int32), counts
+    return V @ affine[:3, :3].T + affine[:3, 3], F, counts
+
+
+def _polygonized(
+    filled: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Marching cubes on the smoothed voxels, in units of these."""
+    from skimage.measure import marching_cubes
+
+    field = ndimage.gaussian_filter(filled.astype(np.float32), _BLUR)
+    if not field.max() > 0.5:
+        raise ArrayError("the mask is nowhere thicker than a voxel; resample it finer")
+    V, F, _, _ = marching_cubes(field, 0.5)
+    return V.astype(np.float64), np.ascontiguousarray(F, np.int32)
+
+
+def _handles(V: NDArray[np.float64], F: NDArray[np.int32]) -> int:
+    """Number of handles of a closed surface, of all its components together."""
+    n = len(V)
+    edges = (np.ones(2 * len(F), bool), (F[:, :2].ravel(), F[:, 1:].ravel()))
+    components, _ = connected_components(coo_array(edges, shape=(n, n)), directed=False)
+    return int(components - (n - len(F) // 2) // 2)
+
+
+def _tunnels(filled: NDArray[np.bool_]) -> int:
+    """Number of tunnels through one island without cavities, of voxels that share faces."""
+    from skimage.measure import euler_number
+
+    return 1 - int(euler_number(filled, connectivity=1))
 
 
 def _one_volume(array: NDArray[Any]) -> NDArray[Any]:

@@ -11,7 +11,7 @@ pytest.importorskip("skimage", reason="masks need scikit-image")
 import stretchmap as sm
 from stretchmap import samples
 from stretchmap.cli import main
-from stretchmap.errors import ArrayError, FileFormatError, MeshError, OptionError
+from stretchmap.errors import ArrayError, FileFormatError, GenusError, MeshError, OptionError
 from stretchmap.preparation.voxels import mask_surface, read_mask
 
 OBLIQUE = np.array(
@@ -137,3 +137,36 @@ def test_a_mask_of_several_volumes_is_refused():
         sm.prepare(several)
     V, _, _ = mask_surface(several[..., :1], np.eye(4))
     assert len(V)
+
+
+def drilled(bit: int) -> np.ndarray:
+    mask = np.zeros((14, 12, 7), bool)
+    mask[2:12, 2:10, 2:5] = True
+    mask[6 : 6 + bit, 5 : 5 + bit] = False
+    return mask
+
+
+def test_a_hole_one_voxel_wide_is_kept_where_it_is_wanted():
+    """Smoothing closes it, as it does where none is wanted."""
+    V, F, counts = mask_surface(drilled(1), OBLIQUE, 1)
+    assert counts["voxels_halved"]
+    surface = sm.TriMesh(V, F, orient=True)
+    surface.require_genus_one()
+    voxel = abs(np.linalg.det(OBLIQUE[:3, :3]))
+    assert surface.volume == pytest.approx(drilled(1).sum() * voxel, rel=0.05)
+    inside = np.argwhere(drilled(1)) @ OBLIQUE[:3, :3].T + OBLIQUE[:3, 3]
+    assert np.allclose(
+        np.sort(V, axis=0)[[0, -1]].mean(axis=0),
+        np.sort(inside, axis=0)[[0, -1]].mean(axis=0),
+        atol=0.1,
+    )
+    V, F, _ = mask_surface(drilled(1), OBLIQUE)
+    assert sm.TriMesh(V, F, orient=True).genus == 0
+    assert sm.prepare(drilled(1), faces=1500).solid.surface.genus == 1
+
+
+def test_a_hole_that_smoothing_closes_all_the_same_is_named():
+    mask = drilled(0)
+    mask[6, 5, 2:4] = mask[7, 6, 3:] = False
+    with pytest.raises(GenusError, match="share edges or corners only, no faces; widen it there"):
+        mask_surface(mask, OBLIQUE, 1)
