@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import warnings
 
 import numpy as np
 
@@ -50,7 +51,9 @@ def even(surface: TriMesh, faces: int, iterations: int = 10) -> TriMesh:
         raise MissingDependencyError(
             "remeshing needs gpytoolbox: pip install 'stretchmap[prepare]'"
         )
-    from gpytoolbox import remesh_botsch
+    with warnings.catch_warnings():  # of names in SciPy and NumPy that it imports
+        warnings.filterwarnings("ignore", category=DeprecationWarning, module=r"gpytoolbox(\.|$)")
+        from gpytoolbox import remesh_botsch
 
     edge = math.sqrt(surface.area / faces * 4.0 / math.sqrt(3.0))
     halved = split_long_edges(surface, _LONG * edge)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -28,6 +30,7 @@ from stretchmap.errors import (
     SelfIntersectionError,
 )
 from stretchmap.preparation import wild
+from stretchmap.preparation.even import even
 from stretchmap.preparation.handles import cut_handles
 from stretchmap.preparation.holes import close_holes, crossings, remove_crossings
 from stretchmap.preparation.rebuild import winding_mask
@@ -409,3 +412,21 @@ def test_what_has_no_size_is_refused():
         sm.prepare(thin)
     with pytest.raises(DegenerateError, match="no face of any size"):
         sm.prepare(sm.TriMesh(np.zeros((3, 3)), [[0, 1, 2]]))
+
+
+def test_what_the_remesher_imports_of_old_names_is_its_own_affair(tmp_path, monkeypatch):
+    source = "import warnings\nwarnings.warn('old', {})\nremesh_botsch = lambda V, F, *_: (V, F)\n"
+    surface = samples.torus_surface(12, 6)
+    for name, category in (("old", "DeprecationWarning"), ("new", "RuntimeWarning")):
+        monkeypatch.delitem(sys.modules, "gpytoolbox")
+        monkeypatch.syspath_prepend(tmp_path / name)
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "gpytoolbox.py").write_text(source.format(category))
+        importlib.invalidate_caches()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            if name == "old":
+                assert even(surface, 144).n_faces >= 144
+            else:
+                with pytest.raises(RuntimeWarning):
+                    even(surface, 144)
