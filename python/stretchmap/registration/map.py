@@ -2,7 +2,7 @@
 landmarks.
 
 The boundaries are laid on each other through their flat tori; the volume map from source
-to target then has its boundary prescribed.
+to target then has its boundary prescribed, or gliding from there.
 """
 
 from __future__ import annotations
@@ -13,25 +13,25 @@ import time
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import read_only
+from ..base.budget import Budget
 from ..base.options import callback, flag, instance, one_of, real, whole
 from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..certificate.checks import certify
-from ..certificate.findings import require_certified
+from ..certificate.findings import Certificate, require_certified
 from ..errors import ArrayError, CertificationError, LandmarkError, SolverError
 from ..maps.history import IterationRecord
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
 from ..mesh.split_edges import SplitSolid
-from ..volume.engine import solve
 from ..volume.options import FillOptions, check_prescribed
-from ..volume.problem import VolumeProblem
 from .affine import affine_landmark_map
 from .embed import EmbeddedBoundary, embed_boundary, split_long_edges, unfold_boundary
+from .filling import Filled, fill_boundary, fill_either_way
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
 from .match import match_surfaces
@@ -121,6 +121,11 @@ def register(
     one that fits them best is taken; else the one in which the two surfaces differ least from
     similar shapes (rotation, translation, scale). Reflections are never used.
 
+    Without landmarks and with ``boundary="glide"``, where the surfaces laid on each other cross, or
+    two fifths of the time leave tets inverted or volumes far off, the volume map of the source,
+    then the inverse of the target's, is where the boundary glides from, if both can be had in time;
+    the better map is returned.
+
     Examples
     --------
     >>> import stretchmap as sm
@@ -154,18 +159,36 @@ def register(
     except LandmarkError as error:
         raise LandmarkError(f"{error}; {mirrored}" if mirrored else str(error), error.ids) from None
     seconds["boundary"] = time.perf_counter() - clock
-    if len(embedded.crossings) and not keep_best:
-        raise CertificationError(
-            f"{len(embedded.crossings)} pairs of faces of the boundary image cross, and refining "
-            "the source's boundary does not help: the surfaces differ too much; landmarks may "
-            "bring them together, keep_best=True returns the map all the same",
-            embedded.crossings.ravel(),
-        )
-    glide = boundary == "glide" and not len(embedded.crossings)
-    return _fill(
-        embedded, glide, target, marks, gauge, landmark_map, history,
-        FillOptions() if options is None else options, keep_best, seconds, progress,
-    )  # fmt: skip
+    options = FillOptions() if options is None else options
+    clock, filled = time.perf_counter(), None
+    budget = Budget.of(options.time_limit, embedded.split.solid.n_tets)
+    if boundary == "glide" and not len(marks):
+        filled = fill_either_way(source, target, embedded, gauge, options, budget, progress)
+    if filled is None:
+        if len(embedded.crossings) and not keep_best:
+            raise CertificationError(
+                f"{len(embedded.crossings)} pairs of faces of the boundary image cross, and "
+                "refining the source's boundary does not help: the surfaces differ too much; "
+                "landmarks may bring them together, keep_best=True returns the map all the same",
+                embedded.crossings.ravel(),
+            )
+        glide = boundary == "glide" and not len(embedded.crossings)
+        filled = fill_boundary(
+            embedded, gauge, target, options,
+            pinned=marks.source, glide=glide, budget=budget, progress=progress,
+        )  # fmt: skip
+    certificate = certify(filled.outcome.problem.solid, _image(filled))
+    if not certificate.certified and filled.outcome.glided:  # a matter of rounding
+        again = Budget.of(options.time_limit, embedded.split.solid.n_tets)
+        filled = fill_boundary(
+            filled.boundary, filled.gauge, target, options,
+            pinned=marks.source, glide=False, budget=again, progress=progress,
+        )  # fmt: skip
+        certificate = certify(filled.outcome.problem.solid, _image(filled))
+    seconds["volume"] = time.perf_counter() - clock
+    if not keep_best:
+        require_certified(certificate, "the registration")
+    return _result(filled, certificate, target, marks, landmark_map, history, seconds)
 
 
 def _landmarks(given: Any, source: TetMesh, target: TetMesh) -> Landmarks:
@@ -224,63 +247,48 @@ def _boundary_map(
     return embed_boundary(split, second, image, points, pairs[:, 0]), gauge, match.history
 
 
-def _fill(
-    boundary: EmbeddedBoundary,
-    glide: bool,
+def _image(filled: Filled) -> NDArray[np.float64]:
+    """Of all vertices (n, 3); where the boundary did not move, the very points it was laid on."""
+    problem, boundary = filled.outcome.problem, filled.boundary
+    image = problem.x * problem.length + problem.center
+    skin = boundary.split.solid.boundary_vertices
+    start = (boundary.points - problem.center) / problem.length
+    still = (problem.x[skin] == start).all(axis=1)
+    image[skin[still]] = boundary.points[still]
+    return np.asarray(image)
+
+
+def _result(
+    filled: Filled,
+    certificate: Certificate,
     target: TetMesh,
     marks: Landmarks,
-    gauge: Gauge,
     landmark_map: LandmarkMap,
     history: tuple[IterationRecord, ...],
-    options: FillOptions,
-    keep_best: bool,
     seconds: dict[str, float],
-    progress: Progress | None,
 ) -> Registration:
-    """The volume map whose boundary is prescribed, or glides from there."""
-    clock = time.perf_counter()
-    source, points = boundary.split.solid, boundary.points
-    problem = VolumeProblem.of(
-        source, points, ground=target.surface, pinned=marks.source, refine=options.refine
-    )
-    skin = source.boundary_vertices
-    start = problem.x[skin]
-    outcome = solve(problem, options, glide=glide, progress=progress)
-    problem, refined = outcome.problem, outcome.problem.refinement
-    added = Refinement.of(boundary.split) if refined is None else refined.after(boundary.split)
-    seconds = {**seconds, "volume": time.perf_counter() - clock}
-    solid, converged, stop_reason = problem.solid, outcome.converged, outcome.stop_reason
-    image = problem.x * problem.length + problem.center
-    moved = (problem.x[skin] != start).any(axis=1)
-    image[skin[~moved]] = points[~moved]
-    clock = time.perf_counter()
-    certificate = certify(solid, image)
-    if not certificate.certified and outcome.glided:  # a matter of rounding
-        return _fill(
-            boundary, False, target, marks, gauge, landmark_map, history, options,
-            keep_best, seconds, progress,
-        )  # fmt: skip
-    seconds["certificate"] = time.perf_counter() - clock
-    if not keep_best:
-        require_certified(certificate, "the registration")
-    if not converged:
-        _log.warning("registration not converged: %s", stop_reason)
+    outcome, split = filled.outcome, filled.boundary.split
+    refined = outcome.problem.refinement
+    added = Refinement.of(split) if refined is None else refined.after(split)
+    if not outcome.converged:
+        _log.warning("registration not converged: %s", outcome.stop_reason)
+    image = _image(filled)
     gap = image[marks.source] - target.V[marks.target]
     size = float(np.linalg.norm(np.ptp(target.V, axis=0)))
     return Registration(
-        mesh=solid,
+        mesh=outcome.problem.solid,
         target=target,
         image=read_only(image),
         landmarks=marks,
         landmark_error=float(np.linalg.norm(gap, axis=1).max(initial=0.0)) / size,
-        gauge=gauge,
+        gauge=filled.gauge,
         landmark_map=landmark_map,
         refinement=added if added.n_split else None,
         boundary="glide" if outcome.glided else "frozen",
-        boundary_splits=boundary.split.n_split,
+        boundary_splits=split.n_split,
         history=history + outcome.history,
         certificate=certificate,
-        converged=converged and certificate.certified,
-        stop_reason=stop_reason,
+        converged=outcome.converged and certificate.certified,
+        stop_reason=outcome.stop_reason,
         seconds=seconds,
     )
