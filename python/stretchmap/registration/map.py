@@ -258,6 +258,18 @@ def _image(filled: Filled) -> NDArray[np.float64]:
     return np.asarray(image)
 
 
+def _stop_reason(filled: Filled, certificate: Certificate) -> str:
+    """Why the optimization ended; where the boundary crossed itself to begin with, that."""
+    reason, crossings = filled.outcome.stop_reason, len(filled.boundary.crossings)
+    if certificate.certified or not crossings:
+        return reason
+    left = reason.removeprefix("the time limit was reached; ")
+    return (
+        f"{crossings} pairs of faces of the boundary image cross, which more time does not mend, "
+        f"but landmarks may: {left}"
+    )
+
+
 def _result(
     filled: Filled,
     certificate: Certificate,
@@ -270,8 +282,9 @@ def _result(
     outcome, split = filled.outcome, filled.boundary.split
     refined = outcome.problem.refinement
     added = Refinement.of(split) if refined is None else refined.after(split)
+    stop_reason = _stop_reason(filled, certificate)
     if not outcome.converged:
-        _log.warning("registration not converged: %s", outcome.stop_reason)
+        _log.warning("registration not converged: %s", stop_reason)
     image = _image(filled)
     gap = image[marks.source] - target.V[marks.target]
     size = float(np.linalg.norm(np.ptp(target.V, axis=0)))
@@ -289,6 +302,6 @@ def _result(
         history=history + outcome.history,
         certificate=certificate,
         converged=outcome.converged and certificate.certified,
-        stop_reason=outcome.stop_reason,
+        stop_reason=stop_reason,
         seconds=seconds,
     )

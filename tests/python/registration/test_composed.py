@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from shapes import cubes
 from stretchmap import _core
 from stretchmap.base.budget import Budget
 from stretchmap.registration import filling
+from stretchmap.registration import map as _map
 from stretchmap.registration.composed import _angles, composed
 from stretchmap.volume.options import FillOptions
 
@@ -80,3 +83,20 @@ def test_angles_of_even_areas():
     for bend in (0.0, 0.5, 0.99):
         s = v + bend * np.sin(v)
         np.testing.assert_allclose(_angles(s, np.full_like(v, bend)), v, atol=1e-9)
+
+
+def test_where_the_boundary_crosses_time_is_not_what_lacks():
+    def reason(crossings, certified):
+        filled = SimpleNamespace(
+            boundary=SimpleNamespace(crossings=crossings),
+            outcome=SimpleNamespace(
+                stop_reason="the time limit was reached; 3 tets could not be untangled"
+            ),
+        )
+        return _map._stop_reason(filled, SimpleNamespace(certified=certified))
+
+    pairs = np.zeros((7, 2), np.int32)
+    assert "time limit" in reason(pairs[:0], False) and "time limit" in reason(pairs, True)
+    assert "time limit" not in reason(pairs, False)
+    assert reason(pairs, False).startswith("7 pairs of faces of the boundary image cross")
+    assert "landmarks" in reason(pairs, False) and "3 tets" in reason(pairs, False)
