@@ -229,14 +229,17 @@ def untangle_whole(
         first = lengths[:_FIRST]
         return len(first) == _FIRST and sum(first) <= _FIRST * _SHORT
 
-    def follow(share: float, widest: float, ends: Callable[[], bool]) -> Untangled:
+    def follow(share: float, widest: float, *, tried: bool = False) -> Untangled:
+        def enough(left: int, since: int, epsilon: float) -> bool:
+            return since >= patience(left, epsilon) or (tried and held_up())
+
         return _continue(
             newton,
             x,
             face=o.face_weight if glide else 0.0,
             floor=o.floor,
             steps=o.untangle_iter,
-            enough=lambda left, since, epsilon: ends() or since >= patience(left, epsilon),
+            enough=enough,
             hasty=hasty,
             soft=share,
             widest=widest,
@@ -245,17 +248,15 @@ def untangle_whole(
             note=note,
         )
 
-    def never() -> bool:
-        return False
-
     if not soft:
-        return follow(0.0, _WIDEST, never)
+        return follow(0.0, _WIDEST)
     inverted = newton.value(x, _core.volume.EnergyWeights(1.0, 1.0, 1.0, 0.0)).flips
-    if inverted <= MOST_STUCK * len(model.T):
-        done = follow(0.0, _WIDEST, held_up)
-        if not held_up():
-            return done
-    return follow(_SOFT, _WIDEST_SOFT, never)
+    if inverted > MOST_STUCK * len(model.T):
+        return follow(_SOFT, _WIDEST_SOFT)
+    done = follow(0.0, _WIDEST, tried=True)
+    if not done.left or not held_up():
+        return done
+    return min(follow(_SOFT, _WIDEST_SOFT), done, key=lambda each: each.left)
 
 
 def stuck_tets(model: SolidModel, x: NDArray[np.float64], *, glide: bool) -> NDArray[np.intp]:

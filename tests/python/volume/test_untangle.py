@@ -234,6 +234,30 @@ def test_steps_are_soft_only_where_many_are_inverted_or_the_first_are_short(
     assert newton.epsilons[hard:][:1] == [5.0] * (softened > 0)
 
 
+@pytest.mark.parametrize("cured", [True, False])
+def test_what_short_steps_cured_is_not_begun_again(cured):
+    """And where soft ones cure less, as with no time left, what was before them counts."""
+
+    class Curing(Dragging):
+        def value(self, x, weights):
+            self.left = (0 if cured else 400) if (x == 4.0).all() and not weights.soft else 500
+            return super().value(x, weights)
+
+        def step(self, x, weights, linear):
+            return super().step(x + 1.0, weights, linear)
+
+    newton = Curing(500, 0.1, worst=0.5 if cured else -400.0)
+    newton.set_targets = lambda _: None
+    model = SimpleNamespace(
+        options=VolumeOptions(untangle_iter=5), T=np.zeros((90_000, 4), int),
+        newton=lambda *_, **__: newton, roomy_weights=None, roomy_volumes=None,
+    )  # fmt: skip
+    history = SimpleNamespace(budget=Budget(60.0), add=lambda *_, **__: None)
+    done = untangle.untangle_whole(model, np.zeros((1, 3)), history, glide=False, soft=True)
+    assert done.left == (0 if cured else 400) and (done.x == 4.0).all()
+    assert len(newton.soft) == (4 if cured else 9)
+
+
 def test_patches_reach_past_no_vertex_that_does_not_move():
     solid = sm.samples.bumpy_torus(3000)
     model = VolumeProblem.of(solid, solid.V[solid.boundary_vertices]).model(VolumeOptions())
