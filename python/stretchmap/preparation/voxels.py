@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..base.arrays import as_reals
 from ..base.files import open_to_read, parsing
 from ..base.options import as_path, memory
 from ..errors import ArrayError, FileFormatError, GenusError, MeshError, MissingDependencyError
 from ..io.npz import read_archive, read_array
+from ..mesh.diagnosis import diagnose_surface
 
 __all__ = ["as_affine", "holds_mask", "mask_surface", "read_mask"]
 
@@ -107,12 +106,12 @@ def mask_surface(
     body = labels == sizes.argmax() + 1
     filled = ndimage.binary_fill_holes(body)
     V, F = _polygonized(filled)
-    halved = _handles(V, F) < genus <= _tunnels(filled)
+    halved = diagnose_surface(V, F).genus.sum() < genus <= _tunnels(filled)
     if halved:
         memory("the mask with its voxels halved", _BYTES_PER_HALVED * filled.size)
         V, F = _polygonized(filled.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2))
         V = 0.5 * V - 0.25
-        if (found := _handles(V, F)) < genus:
+        if (found := int(diagnose_surface(V, F).genus.sum())) < genus:
             raise GenusError(
                 f"the mask has genus {_tunnels(filled)}, its smoothed surface {found}, {genus} is "
                 "wanted: voxels of a hole share edges or corners only, no faces; widen it there, "
@@ -140,14 +139,6 @@ def _polygonized(
         raise ArrayError("the mask is nowhere thicker than a voxel; resample it finer")
     V, F, _, _ = marching_cubes(field, 0.5)
     return V.astype(np.float64), np.ascontiguousarray(F, np.int32)
-
-
-def _handles(V: NDArray[np.float64], F: NDArray[np.int32]) -> int:
-    """Number of handles of a closed surface, of all its components together."""
-    n = len(V)
-    edges = (np.ones(2 * len(F), bool), (F[:, :2].ravel(), F[:, 1:].ravel()))
-    components, _ = connected_components(coo_array(edges, shape=(n, n)), directed=False)
-    return int(components - (n - len(F) // 2) // 2)
 
 
 def _tunnels(filled: NDArray[np.bool_]) -> int:
