@@ -20,7 +20,9 @@ from ..base.arrays import given_rows, read_only, with_means
 from .meshes import TetMesh
 from .split_edges import TET_EDGES, SplitSolid, split_edges
 
-__all__ = ["Refinement", "refine_overconstrained"]
+__all__ = ["TETS_PER_EDGE", "Refinement", "refine_overconstrained"]
+
+TETS_PER_EDGE = 6  # that halving an inner edge adds, about
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from .. import _core
 from ..base.budget import Budget
 from ..base.progress import Progress
 from ..certificate.checks import certify
-from ..mesh.refinement import longest_inner_edges
+from ..mesh.refinement import TETS_PER_EDGE, longest_inner_edges
 from .equalize import equalize
 from .exact_rings import make_rings_exact
 from .ground import glide_on_mesh
@@ -40,8 +40,8 @@ _log = logging.getLogger("stretchmap")
 # are for have so many times the mean energy, and so much of the mean volume.
 _UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, (3.0, 1.0)
 # Of coarse solids more and smaller tets get vertices where those do not lead to such a mean, as
-# long as there are no more tets than that, with so many for an edge.
-_BADLY, _MORE, _COARSE, _PER_EDGE = 0.06, ((1.0, 0.1), (0.3, 0.1)), 5000, 6
+# long as there are no more tets than that.
+_BADLY, _MORE, _COARSE = 0.06, ((1.0, 0.1), (0.3, 0.1)), 5000
 _FINER = 0.7  # share of the time left that this may take
 _GAINED = 0.99  # of how uneven volumes were, at most: else the vertices are taken back
 
@@ -193,7 +193,7 @@ def _finer(run: Run, done: Minimized) -> Minimized:
             before, edges = run.problem, _uneven_edges(run.problem, *poor)
             if not len(edges) or history.budget.spent:
                 break
-            fine = before.solid.n_tets + _PER_EDGE * len(edges) > _COARSE
+            fine = before.solid.n_tets + TETS_PER_EDGE * len(edges) > _COARSE
             if poor is not _POOR and (fine or _mean_error(before, run.x) <= _BADLY):
                 break
             run.take(before.halved(edges))
@@ -246,9 +246,7 @@ def _is_gain(before: VolumeProblem, after: VolumeProblem, x: NDArray[np.float64]
     return _GAINED * now <= was and _mean_error(after, x) < _GAINED * _mean_error(before, before.x)
 
 
-def _uneven_edges(
-    problem: VolumeProblem, energies: float = _POOR[0], size: float = _POOR[1]
-) -> NDArray[np.int32]:
+def _uneven_edges(problem: VolumeProblem, energies: float, size: float) -> NDArray[np.int32]:
     """The longest edges of the tets whose volume is kept worst; none if all keep it well enough.
 
     Parameters

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.budget import Budget
-from ..mesh.refinement import crowded_edges, surrounding_edges
+from ..mesh.refinement import TETS_PER_EDGE, crowded_edges, surrounding_edges
 from .ground import untangle_on_mesh
 from .run import Run
 from .untangle import (
@@ -51,9 +51,9 @@ _HALVING = 0.5
 _NEARLY = 0.9  # share of the time left that untangling may take if only so few are left
 # Times the fewest so far, and so many more: halving breeds more than it cures.
 _TIMES, _MORE = 2, 100
-# Times the tets there were that halving may come to, and tets added for an edge: a coarse solid
-# needs them, where single vertices inside see hundreds of faces.
-_MOST_TETS, _PER_EDGE = 10, 6
+# Times the tets there were that halving may come to: a coarse solid needs them, where single
+# vertices inside see hundreds of faces.
+_MOST_TETS = 10
 
 
 def untangle(run: Run, *, glide: bool) -> int:
@@ -79,7 +79,7 @@ def untangle(run: Run, *, glide: bool) -> int:
         if not _inverted(run):
             break  # folded faces are left, which more vertices inside do not unfold
         halved = edges(run.problem.solid, stuck)
-        if run.problem.solid.n_tets + _PER_EDGE * len(halved) > most:
+        if run.problem.solid.n_tets + TETS_PER_EDGE * len(halved) > most:
             break
         _halve(run, halved, stuck)
         stuck = _patched(run, glide=glide)
