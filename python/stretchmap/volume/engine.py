@@ -37,11 +37,11 @@ __all__ = ["solve"]
 _log = logging.getLogger("stretchmap")
 
 # Mean abs(ratio - 1) from which on more vertices are worth their time, and how often; the tets they
-# are for have so many times the mean energy, and so much of the mean volume.
-_UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, (3.0, 1.0)
-# Of coarse solids more and smaller tets get vertices where those do not lead to such a mean, as
-# long as there are no more tets than that.
-_BADLY, _MORE, _COARSE = 0.06, ((1.0, 0.1), (0.3, 0.1)), 5000
+# are for have so many times the mean energy.
+_UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, 3.0
+# Of coarse solids more tets get vertices where those do not lead to such a mean, as long as there
+# are no more tets than that.
+_BADLY, _MORE, _COARSE = 0.06, (1.0, 0.3), 5000
 _FINER = 0.7  # share of the time left that this may take
 _GAINED = 0.99  # of how uneven volumes were, at most: else the vertices are taken back
 
@@ -190,18 +190,18 @@ def _finer(run: Run, done: Minimized) -> Minimized:
     for poor in (_POOR, *_MORE):
         for _ in range(_FINER_ROUNDS):
             run.x = done.x
-            before, edges = run.problem, _uneven_edges(run.problem, *poor)
+            before, edges = run.problem, _uneven_edges(run.problem, poor)
             if not len(edges) or history.budget.spent:
                 break
             fine = before.solid.n_tets + TETS_PER_EDGE * len(edges) > _COARSE
-            if poor is not _POOR and (fine or _mean_error(before, run.x) <= _BADLY):
+            if poor != _POOR and (fine or _mean_error(before, run.x) <= _BADLY):
                 break
             run.take(before.halved(edges))
             more = minimize(
                 history.model, run.x, history, glide=True, start=o.volume_weight,
                 goal=o.volume_weight, leave=partial(_is_uneven, run.problem),
             )  # fmt: skip
-            if not _is_gain(before, run.problem, more.x):
+            if not _unevenness(run.problem, more.x) < _GAINED * _unevenness(before, before.x):
                 run.take(before)
                 break
             done = more
@@ -238,30 +238,15 @@ def _is_uneven(problem: VolumeProblem, x: NDArray[np.float64]) -> bool:
     return _mean_error(problem, x) > _UNEVEN
 
 
-def _is_gain(before: VolumeProblem, after: VolumeProblem, x: NDArray[np.float64]) -> bool:
-    """Whether volumes are more even, or those of small tets are at nearly no cost of the others."""
-    was, now = _unevenness(before, before.x), _unevenness(after, x)
-    if now < _GAINED * was:
-        return True
-    return _GAINED * now <= was and _mean_error(after, x) < _GAINED * _mean_error(before, before.x)
-
-
-def _uneven_edges(problem: VolumeProblem, energies: float, size: float) -> NDArray[np.int32]:
-    """The longest edges of the tets whose volume is kept worst; none if all keep it well enough.
-
-    Parameters
-    ----------
-    problem : VolumeProblem
-    energies, size : float
-        How many times the mean energy, and how much of the mean volume, these tets have at least.
-    """
+def _uneven_edges(problem: VolumeProblem, poor: float) -> NDArray[np.int32]:
+    """The longest edges of the tets whose volume is kept worst, with more than so many times the
+    mean energy; none if all keep it well enough."""
     if not _is_uneven(problem, problem.x):
         return np.empty((0, 2), np.int32)
     ratios, volumes = _ratios(problem, problem.x)
     energy = 0.5 * (ratios + 1.0 / ratios) - 1.0
-    mean = np.average(energy, weights=volumes)
-    poor = (energy > energies * mean) & (volumes > size * volumes.mean())
-    return longest_inner_edges(problem.solid, problem.V, np.flatnonzero(poor))
+    worst = (energy > poor * np.average(energy, weights=volumes)) & (volumes > volumes.mean())
+    return longest_inner_edges(problem.solid, problem.V, np.flatnonzero(worst))
 
 
 def _glided_on_mesh(run: Run) -> Outcome:

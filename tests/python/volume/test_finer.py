@@ -205,14 +205,14 @@ def test_vertices_are_for_large_tets_that_keep_their_volume_worst(monkeypatch):
     solid = sm.samples.bumpy_torus(3000)
     torus = sm.area_map(solid.surface).torus
     problem = VolumeProblem.of(solid, solid.V, torus=torus, warm=True)
-    assert not len(engine._uneven_edges(problem, *engine._POOR))  # all ratios are one
+    assert not len(engine._uneven_edges(problem, engine._POOR))  # all ratios are one
     volumes, inside = solid.tet_volumes, solid.boundary_index < 0
     moved = int(np.flatnonzero(inside)[len(solid.V) // 5])
     at = (solid.T == moved).any(axis=1)
     x = problem.x.copy()
     x[moved] += 0.4 * (x[solid.T[at]].reshape(-1, 3).max(axis=0) - x[moved])
     uneven = dataclasses.replace(problem, x=x)
-    assert not len(engine._uneven_edges(uneven, *engine._POOR))  # on the whole they are good enough
+    assert not len(engine._uneven_edges(uneven, engine._POOR))  # on the whole they are good enough
     monkeypatch.setattr(engine, "_UNEVEN", 0.0)
     ratios = _core.mesh.tet_volumes(x, solid.T) / _core.mesh.tet_volumes(problem.V, solid.T)
     assert ratios.min() > 0.0 and (np.abs(ratios[at] - 1.0) > 0.05).any()
@@ -220,7 +220,7 @@ def test_vertices_are_for_large_tets_that_keep_their_volume_worst(monkeypatch):
     large = volumes > volumes.mean()
     worst = large & (energy > 3.0 * (energy * volumes).sum() / volumes.sum())
     assert (worst & at).any() and (large & ~worst).any() and not (worst & ~at).any()
-    found = engine._uneven_edges(uneven, *engine._POOR)
+    found = engine._uneven_edges(uneven, engine._POOR)
     np.testing.assert_array_equal(
         found, longest_inner_edges(solid, problem.V, np.flatnonzero(worst))
     )
