@@ -75,9 +75,10 @@ def levels_of(
     pieces: Pieces, axis: str, shares: NDArray[np.float64], start: float, of: str
 ) -> NDArray[np.float64]:
     """Levels that divide source or image as asked: p - 1 for s, p angles from 0 on for u and v."""
+    pieces = pieces.compact()  # within a part of a grid few points are left
     if axis == "s":
         below = _shell_volume(pieces, of)
-        values = pieces.points[np.unique(pieces.T), 7]
+        values = pieces.points[:, 7]
         ends = (float(values.min()), float(values.max()))
     else:
         below = _sector_volume(pieces, axis, start, of)

@@ -48,6 +48,13 @@ class Pieces:
         T = np.ascontiguousarray(self.T[chosen])
         return Pieces(self.points, T, self.parent[chosen], self.center)
 
+    def compact(self) -> Pieces:
+        """The same tets, without points that none of them has."""
+        used = np.zeros(len(self.points), bool)
+        used[self.T] = True
+        place = (np.cumsum(used) - 1).astype(np.int32)
+        return Pieces(self.points[used], place[self.T], self.parent, self.center)
+
 
 def volumes_of_parts(
     labels: NDArray[np.integer], volumes: NDArray[np.float64], count: int
