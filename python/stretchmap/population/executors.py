@@ -10,9 +10,12 @@ import importlib.util
 import multiprocessing
 import os
 import re
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
 from ..base.options import shown, whole
@@ -66,7 +69,8 @@ class Processes:
     """A pool of processes on this machine; one that dies is replaced and its job done again.
 
     The processes are spawned, so a script that uses them needs the usual
-    ``if __name__ == "__main__":``.
+    ``if __name__ == "__main__":``. They end at once when the run is interrupted, or this process
+    does, whatever they are at.
 
     Parameters
     ----------
@@ -109,27 +113,42 @@ class Processes:
         self, task: Task, jobs: Sequence[Any], ids: Sequence[int], lost: list[int]
     ) -> Iterator[tuple[int, Any]]:
         """Jobs in a pool; those it was at when it broke go to ``lost``."""
-        waiting = list(reversed(ids))
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(min(self.workers, len(waiting)), mp_context=context) as pool:
-            _require_started(pool)
-            running: dict[Future[Any], int] = {}
-            while (waiting or running) and not lost:
-                try:
-                    while waiting and len(running) < self.workers:
-                        running[pool.submit(task, jobs[waiting[-1]])] = waiting[-1]
-                        waiting.pop()
-                except BrokenProcessPool:
-                    pass  # told by the futures that are running
-                done = wait(running, return_when=FIRST_COMPLETED).done
-                if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
-                    done = wait(running).done
-                for future in done:
-                    i = running.pop(future)
-                    if isinstance(future.exception(), BrokenProcessPool):
-                        lost.append(i)
-                    else:
-                        yield i, future.result()
+        workers = min(self.workers, len(ids))
+        theirs, ours = context.Pipe(duplex=False)
+        with theirs, ours, ProcessPoolExecutor(workers, context, _end_with, (theirs,)) as pool:
+            try:
+                _require_started(pool)
+                yield from self._done_in(pool, task, jobs, list(reversed(ids)), lost)
+            except BaseException:
+                ours.close()  # or leaving the pool would wait for what it is at
+                raise
+
+    def _done_in(
+        self,
+        pool: ProcessPoolExecutor,
+        task: Task,
+        jobs: Sequence[Any],
+        waiting: list[int],
+        lost: list[int],
+    ) -> Iterator[tuple[int, Any]]:
+        running: dict[Future[Any], int] = {}
+        while (waiting or running) and not lost:
+            try:
+                while waiting and len(running) < self.workers:
+                    running[pool.submit(task, jobs[waiting[-1]])] = waiting[-1]
+                    waiting.pop()
+            except BrokenProcessPool:
+                pass  # told by the futures that are running
+            done = wait(running, return_when=FIRST_COMPLETED).done
+            if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
+                done = wait(running).done
+            for future in done:
+                i = running.pop(future)
+                if isinstance(future.exception(), BrokenProcessPool):
+                    lost.append(i)
+                else:
+                    yield i, future.result()
 
 
 class Dask:
@@ -223,6 +242,18 @@ def as_executor(executor: Any) -> Executor:
         "executor must be 'serial', 'processes', 'processes:N', 'dask://host:port', a Dask client "
         f"or an object with a method run(task, jobs), got {shown(executor)}"
     )
+
+
+def _end_with(pipe: Connection) -> None:
+    """End this process, a worker, when the other end of a pipe is closed, as by the end of whoever
+    holds it."""
+
+    def watch() -> None:
+        with suppress(EOFError, OSError):
+            pipe.recv()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _require_started(pool: ProcessPoolExecutor) -> None:

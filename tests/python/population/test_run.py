@@ -188,6 +188,30 @@ def test_a_job_that_kills_its_worker_is_given_up_and_the_others_are_not(tmp_path
     assert outcomes == {i: str(i) for i in (0, 1, 3, 4)}
 
 
+def test_workers_end_with_a_run_that_is_left_whatever_they_are_at():
+    run, begun = as_executor("processes:2").run(time.sleep, [100.0, 0.0]), time.monotonic()
+    assert next(run) == (1, None)
+    run.close()
+    assert time.monotonic() - begun < 60.0
+
+
+def test_workers_end_with_whoever_runs_them(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import time\n"
+        "from stretchmap.population.executors import Processes\n"
+        "if __name__ == '__main__':\n"
+        "    for done in Processes(2).run(time.sleep, [0.0, 100.0]):\n"
+        "        print(done, flush=True)\n",
+        encoding="utf-8",
+    )
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, env=env) as run:
+        assert run.stdout.readline().strip() == b"(0, None)"
+        run.kill()
+        run.communicate(timeout=60.0)  # workers have its output, too
+
+
 @pytest.mark.slow
 def test_a_dask_cluster_with_a_worker_killed_gives_the_same_bits(
     guided, folder, landmarks, tmp_path
