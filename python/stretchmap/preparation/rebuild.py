@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SelfIntersectionError
+from ..errors import ConnectivityError, SelfIntersectionError
 from ..mesh.meshes import TriMesh
 from .soup import keep_largest, part_sheets
 from .voxels import mask_surface
@@ -37,7 +37,7 @@ def rebuilt(surface: TriMesh, step: float) -> TriMesh:
     Raises
     ------
     SelfIntersectionError
-        The surface winds round nothing of that size.
+        The surface winds round nothing of that size, or round two large pieces.
     MissingDependencyError
         If scikit-image is not installed.
     """
@@ -48,7 +48,13 @@ def rebuilt(surface: TriMesh, step: float) -> TriMesh:
         raise SelfIntersectionError("the surface crosses itself and winds round nothing", [])
     affine = np.diag([step, step, step, 1.0])
     affine[:3, 3] = corner
-    V, F, _ = mask_surface(mask, affine)
+    try:
+        V, F, _ = mask_surface(mask, affine)
+    except ConnectivityError as error:
+        raise SelfIntersectionError(
+            "the surface crosses itself and winds round two large pieces; repair it, or split it "
+            "and prepare one of them"
+        ) from error
     V, F, _ = part_sheets(V, F)
     V, F, _ = keep_largest(V, F)
     return TriMesh(V, F, orient=True)

@@ -17,13 +17,15 @@ from scipy.spatial import cKDTree
 from .. import _core
 from ..errors import ConnectivityError
 
-__all__ = ["compacted", "components", "keep_largest", "labels", "part_sheets", "weld"]
+__all__ = [
+    "LARGEST_DEBRIS", "compacted", "components", "keep_largest", "labels", "part_sheets", "weld",
+]  # fmt: skip
 
 Points = NDArray[np.float64]
 Faces = NDArray[np.int32]
 
-# Two pieces are debris and body only if their areas are farther apart than this.
-_LARGEST_DEBRIS = 0.3
+# Two pieces are debris and body only if their areas, or numbers of voxels, are farther apart.
+LARGEST_DEBRIS = 0.3
 
 
 def weld(V: Points, F: Faces, tolerance: float) -> tuple[Points, Faces, dict[str, int]]:
@@ -137,7 +139,7 @@ def keep_largest(V: Points, F: Faces) -> tuple[Points, Faces, dict[str, Any]]:
     kept = int(areas.argmax())
     body = F[label == kept]
     others = np.delete(np.arange(len(areas)), kept)
-    for part in others[areas[others] > _LARGEST_DEBRIS * areas[kept]]:
+    for part in others[areas[others] > LARGEST_DEBRIS * areas[kept]]:
         faces = np.flatnonzero(label == part)
         if abs(_winding(V, body, V[F[faces[0], 0]])) < 0.5:
             raise ConnectivityError(

@@ -15,9 +15,17 @@ from scipy import ndimage
 from ..base.arrays import as_reals
 from ..base.files import open_to_read, parsing
 from ..base.options import as_path, memory
-from ..errors import ArrayError, FileFormatError, GenusError, MeshError, MissingDependencyError
+from ..errors import (
+    ArrayError,
+    ConnectivityError,
+    FileFormatError,
+    GenusError,
+    MeshError,
+    MissingDependencyError,
+)
 from ..io.npz import read_archive, read_array
 from ..mesh.diagnosis import diagnose_surface
+from .soup import LARGEST_DEBRIS
 
 __all__ = ["as_affine", "holds_mask", "mask_surface", "read_mask"]
 
@@ -81,6 +89,8 @@ def mask_surface(
     ------
     ArrayError
         Not such a mask, or an empty one.
+    ConnectivityError
+        Another island that is not inside the largest is too large to be debris.
     OptionError
         Voxels would have to be halved, which takes more memory than there is.
     GenusError
@@ -101,10 +111,7 @@ def mask_surface(
 
     box = ndimage.find_objects((mask != 0).astype(np.uint8))[0]
     inside = np.pad(mask[box] != 0, 3)
-    labels, _ = ndimage.label(inside)
-    sizes = np.bincount(labels.ravel())[1:]
-    body = labels == sizes.argmax() + 1
-    filled = ndimage.binary_fill_holes(body)
+    filled, counts = _largest_island(inside)
     V, F = _polygonized(filled)
     halved = diagnose_surface(V, F).genus.sum() < genus <= _tunnels(filled)
     if halved:
@@ -117,15 +124,32 @@ def mask_surface(
                 "wanted: voxels of a hole share edges or corners only, no faces; widen it there, "
                 "or segment a finer image"
             )
-    counts = {
-        "island_voxels_dropped": int(sizes.sum() - sizes.max()),
-        "cavity_voxels_filled": int(filled.sum() - sizes.max()),
-        "faces": len(F),
-    }
+    counts["faces"] = len(F)
     if halved:
         counts["voxels_halved"] = 1
     V = V + np.array([axis.start for axis in box]) - 3
     return V @ affine[:3, :3].T + affine[:3, 3], F, counts
+
+
+def _largest_island(
+    inside: NDArray[np.bool_],
+) -> tuple[NDArray[np.bool_], dict[str, int]]:
+    """The largest of the islands, of voxels that share faces, with its cavities filled."""
+    labels, _ = ndimage.label(inside)
+    sizes = np.bincount(labels.ravel())[1:]
+    filled = ndimage.binary_fill_holes(labels == sizes.argmax() + 1)
+    outside = np.bincount(labels[~filled], minlength=2)[1:]
+    if outside.max() > LARGEST_DEBRIS * sizes.max():
+        raise ConnectivityError(
+            f"the mask has two large islands, the second with {outside.max() / sizes.max():.0%} of "
+            "the voxels of the first, and no voxel of one shares a face with one of the other; "
+            "join them, or split the mask and prepare one of them"
+        )
+    counts = {
+        "island_voxels_dropped": int(outside.sum()),
+        "cavity_voxels_filled": int(filled.sum() - sizes.max()),
+    }
+    return filled, counts
 
 
 def _polygonized(

@@ -11,7 +11,16 @@ pytest.importorskip("skimage", reason="masks need scikit-image")
 import stretchmap as sm
 from stretchmap import samples
 from stretchmap.cli import main
-from stretchmap.errors import ArrayError, FileFormatError, GenusError, MeshError, OptionError
+from stretchmap.errors import (
+    ArrayError,
+    ConnectivityError,
+    FileFormatError,
+    GenusError,
+    MeshError,
+    OptionError,
+    SelfIntersectionError,
+)
+from stretchmap.preparation.rebuild import rebuilt
 from stretchmap.preparation.voxels import mask_surface, read_mask
 
 OBLIQUE = np.array(
@@ -170,3 +179,27 @@ def test_a_hole_that_smoothing_closes_all_the_same_is_named():
     mask[6, 5, 2:4] = mask[7, 6, 3:] = False
     with pytest.raises(GenusError, match="share edges or corners only, no faces; widen it there"):
         mask_surface(mask, OBLIQUE, 1)
+
+
+def test_two_large_islands_are_refused_and_small_ones_dropped():
+    body = drilled(2)
+    with pytest.raises(ConnectivityError, match="two large islands, the second with 100%"):
+        mask_surface(np.concatenate([body, body]), np.eye(4))
+    small = np.concatenate([body, np.zeros_like(body)])
+    small[20:24, 4:8, 2:5] = True
+    assert mask_surface(small, np.eye(4))[2]["island_voxels_dropped"] == 4 * 4 * 3
+
+
+def test_an_island_in_a_cavity_is_no_second_piece():
+    mask = np.pad(np.ones((16, 16, 16), bool), 1)
+    mask[2:-2, 2:-2, 2:-2] = np.pad(np.ones((8, 8, 8), bool), 3)
+    counts = mask_surface(mask, np.eye(4))[2]
+    assert (counts["island_voxels_dropped"], counts["cavity_voxels_filled"]) == (0, 14**3)
+
+
+def test_two_large_pieces_of_what_is_rebuilt_are_refused():
+    torus = samples.torus_surface(20, 10)
+    V = np.vstack([torus.V, torus.V + 10.0])
+    F = np.vstack([torus.F, torus.F + torus.n_vertices])
+    with pytest.raises(SelfIntersectionError, match="two large pieces"):
+        rebuilt(sm.TriMesh(V, F), 0.5)
