@@ -81,7 +81,7 @@ def mask_surface(
     Returns
     -------
     V, F : ndarrays
-        Marching cubes on the smoothed mask; all faces oriented alike, either way.
+        Marching cubes on the smoothed mask, faces oriented outwards.
     counts : dict
         Voxels of islands dropped and of cavities filled, faces, and whether voxels were halved.
 
@@ -128,6 +128,8 @@ def mask_surface(
     if halved:
         counts["voxels_halved"] = 1
     V = V + np.array([axis.start for axis in box]) - 3
+    if np.linalg.det(affine[:3, :3]) < 0.0:
+        F = np.ascontiguousarray(F[:, ::-1])
     return V @ affine[:3, :3].T + affine[:3, 3], F, counts
 
 
@@ -161,7 +163,7 @@ def _polygonized(
     field = ndimage.gaussian_filter(filled.astype(np.float32), _BLUR)
     if not field.max() > 0.5:
         raise ArrayError("the mask is nowhere thicker than a voxel; resample it finer")
-    V, F, _, _ = marching_cubes(field, 0.5)
+    V, F, _, _ = marching_cubes(field, 0.5, gradient_direction="ascent")  # faces outwards
     return V.astype(np.float64), np.ascontiguousarray(F, np.int32)
 
 

@@ -21,6 +21,7 @@ from stretchmap.errors import (
     SelfIntersectionError,
 )
 from stretchmap.preparation.rebuild import rebuilt
+from stretchmap.preparation.soup import part_sheets
 from stretchmap.preparation.voxels import mask_surface, read_mask
 
 OBLIQUE = np.array(
@@ -203,3 +204,10 @@ def test_two_large_pieces_of_what_is_rebuilt_are_refused():
     F = np.vstack([torus.F, torus.F + torus.n_vertices])
     with pytest.raises(SelfIntersectionError, match="two large pieces"):
         rebuilt(sm.TriMesh(V, F), 0.5)
+
+
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_faces_of_a_mask_are_made_outwards(mirrored):
+    """Turned afterwards, they would be reported as if the mask had been inside out."""
+    V, F, _ = mask_surface(lopsided_mask(), OBLIQUE @ np.diag([mirrored, 1.0, 1.0, 1.0]))
+    assert part_sheets(V, F)[2]["turned"] == 0
