@@ -142,7 +142,7 @@ def check_fields(output: Path, mesh: TriMesh | TetMesh, fields: Fields) -> Field
 
     own = carried(mesh, None, *fields)
     try:
-        require_storable(output, *own)
+        require_storable(output, mesh, *own)
     except ArrayError as error:
         raise ArrayError(f"{output}: {error}") from error
     return own

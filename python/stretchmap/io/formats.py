@@ -9,7 +9,7 @@ format                        holds      remarks
 ``.ply``                      surfaces   point and cell arrays as properties
 ``.stl``                      surfaces   single precision; equal corners become one vertex
 ``.vtu .vtk .xdmf .msh``      both       point and cell arrays; through meshio
-``.mesh``                     both       no arrays; through meshio
+``.mesh``                     both       one reference per point and per cell; through meshio
 ``.vtp``                      surfaces   read only; through PyVista, as what meshio does not know
 ``.glb .gltf .3mf``           surfaces   read only; through trimesh, parts joined and welded
 ============================  =========  ======================================================
@@ -22,13 +22,15 @@ from pathlib import Path
 
 from ..errors import FileFormatError
 
-__all__ = ["BY_MESHIO", "BY_TRIMESH", "OF_SURFACES", "known_suffix", "suffixes"]
+__all__ = ["BY_MESHIO", "BY_TRIMESH", "OF_SURFACES", "WITHOUT_ARRAYS", "known_suffix", "suffixes"]
 
 # Read and written here, beside .npz.
 OF_SURFACES = (".obj", ".off", ".ply", ".stl")
 # Suffix -> meshio's name of the format.
 BY_MESHIO = {".msh": "gmsh", ".vtu": "vtu", ".vtk": "vtk", ".mesh": "medit", ".xdmf": "xdmf"}
 BY_TRIMESH = (".glb", ".gltf", ".3mf")
+# Of those written, what holds no arrays, or nothing but references.
+WITHOUT_ARRAYS = (".obj", ".off", ".stl", ".mesh")
 
 
 def suffixes(solid: bool) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -202,18 +203,9 @@ def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:
     Raises
     ------
     ArrayError
-        The name of an array is one that PLY has for the mesh, that of another array once spaces
-        are underscores and columns have numbers, or not of ASCII characters.
+        As `require_names`.
     """
-    columns, cells = _columns(mesh.point_data), _columns(mesh.cell_data)
-    of_points, of_faces = set(_AXES), {"#", *_CORNERS}
-    for name in (*columns, *cells):
-        taken = (name in columns and name in of_points) or (name in cells and name in of_faces)
-        if taken or not name.isascii():
-            raise ArrayError(
-                f"an array named {shown(name)} cannot be written to .ply, whose names are of ASCII "
-                f"characters and other than {', '.join((*_AXES, *_CORNERS))}; rename it"
-            )
+    columns, cells = require_names(mesh.point_data, mesh.cell_data)
     points = {axis: mesh.V[:, k] for k, axis in enumerate(_AXES)} | columns
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.V)}"]
     lines += [f"property {_NAMES[a.dtype.str[1:]]} {name}" for name, a in points.items()]
@@ -235,7 +227,30 @@ def write_ply(file: BinaryIO, mesh: MeshArrays) -> None:
     file.write(face.tobytes())
 
 
-def _columns(data: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def require_names(
+    point_data: Mapping[str, NDArray[Any]], cell_data: Mapping[str, NDArray[Any]]
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    """The columns of all arrays, (n,) each, by the names they have in a file.
+
+    Raises
+    ------
+    ArrayError
+        The name of an array is one that PLY has for the mesh, that of another array once spaces
+        are underscores and columns have numbers, or not of ASCII characters.
+    """
+    columns, cells = _columns(point_data), _columns(cell_data)
+    of_points, of_faces = set(_AXES), {"#", *_CORNERS}
+    for name in (*columns, *cells):
+        taken = (name in columns and name in of_points) or (name in cells and name in of_faces)
+        if taken or not name.isascii():
+            raise ArrayError(
+                f"an array named {shown(name)} cannot be written to .ply, whose names are of ASCII "
+                f"characters and other than {', '.join((*_AXES, *_CORNERS))}; rename it"
+            )
+    return columns, cells
+
+
+def _columns(data: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """One entry per column; column k of a vector gets the suffix ``_k``, and spaces underscores."""
     columns: dict[str, NDArray[Any]] = {}
     whose: dict[str, str] = {}

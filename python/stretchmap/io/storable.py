@@ -1,4 +1,5 @@
-"""Data of points and cells as a format can hold them: all values kept, or refused beforehand."""
+"""Data of points and cells as a format can hold them: all values kept, or refused beforehand; in
+Medit files, which have no place for arrays, regions alone."""
 
 from __future__ import annotations
 
@@ -12,12 +13,15 @@ from numpy.typing import NDArray
 from ..base.options import shown
 from ..errors import ArrayError
 
-__all__ = ["GMSH_TAGS", "storable"]
+__all__ = ["GMSH_TAGS", "medit_refs", "storable"]
 
 _log = logging.getLogger("stretchmap")
 
 # Regions of Gmsh's: of a cell, the first physical group and the entity.
 GMSH_TAGS = ("gmsh:physical", "gmsh:geometrical")
+# What a cell belongs to, by the names readers and partitions give it; the first counts.
+_MEDIT_REFS = "medit:ref"
+_REGIONS = (_MEDIT_REFS, *GMSH_TAGS, "part")
 
 # Types of numbers a format holds, in the order they are tried. Of single precision meshio writes a
 # digit too few into .xdmf.
@@ -84,6 +88,40 @@ def storable(suffix: str, data: Mapping[str, NDArray[Any]]) -> dict[str, NDArray
             )
         arrays[name] = found
     return arrays
+
+
+def medit_refs(
+    data: Mapping[str, NDArray[Any]],
+) -> tuple[dict[str, NDArray[Any]], list[str]]:
+    """What Medit files hold of the data of points, or of cells, and the names of the rest.
+
+    A point and a cell have one whole number each, their reference: it is ``medit:ref``,
+    ``gmsh:physical``, ``gmsh:geometrical`` or ``part``, the first that is there, or else the only
+    array of integers.
+
+    Parameters
+    ----------
+    data : mapping of str to (n,) or (n, c) ndarray
+
+    Returns
+    -------
+    refs : dict
+        ``medit:ref``, (n,) of int64, or nothing.
+    left_out : list of str
+    """
+    least, most = np.iinfo(np.int32).min, np.iinfo(np.int32).max  # those of Medit's version 2
+    whole = {
+        name: array.reshape(-1)
+        for name, array in data.items()
+        if array.dtype.kind in "iu"
+        and array.shape in ((len(array),), (len(array), 1))
+        and least <= array.min(initial=0) <= array.max(initial=0) <= most
+    }
+    chosen = next((name for name in _REGIONS if name in whole), None)
+    if chosen is None and len(whole) == 1:
+        (chosen,) = whole
+    refs = {} if chosen is None else {_MEDIT_REFS: whole[chosen].astype(np.int64)}
+    return refs, [name for name in data if name != chosen]
 
 
 def _as_one_of(array: NDArray[Any], types: tuple[str, ...]) -> NDArray[Any] | None:

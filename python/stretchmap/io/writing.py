@@ -10,24 +10,26 @@ import errno
 import logging
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import BinaryIO
 
 from numpy.typing import ArrayLike
 
 from ..base.files import atomic_path
-from ..base.options import as_path
+from ..base.options import as_path, shown
 from ..errors import FileFormatError
 from ..mesh.given import as_mesh
 from ..mesh.meshes import TetMesh, TriMesh
 from .arrays import MeshArrays, checked, checked_uv
-from .formats import BY_MESHIO, known_suffix, suffixes
+from .formats import BY_MESHIO, WITHOUT_ARRAYS, known_suffix, suffixes
 from .meshio import write_meshio
 from .npz import write_npz
 from .obj import write_obj
 from .off import write_off
 from .ply import write_ply
 from .stl import write_stl
-from .storable import storable
+from .storable import medit_refs, storable
 
 __all__ = ["write"]
 
@@ -39,7 +41,6 @@ _WRITERS: dict[str, Callable[[BinaryIO, MeshArrays], None]] = {
     ".ply": write_ply,
     ".stl": write_stl,
 }
-_WITHOUT_DATA = {".obj", ".off", ".stl", ".mesh"}
 
 
 def write(
@@ -57,8 +58,9 @@ def write(
         As for `read`. An existing file is replaced, but only once the new one is complete.
     mesh : TriMesh or TetMesh
     point_data, cell_data : mapping of str to (n,) or (n, d) array_like, optional
-        One row per vertex, or per face or tet. Formats without arrays leave them out. Numbers of a
-        type that the format does not have are written as those of one that holds all their values.
+        One row per vertex, or per face or tet. Formats without arrays leave them out, with a
+        warning; ``.mesh`` holds one array of regions. Numbers of a type that the format does not
+        have are written as those of one that holds all their values.
     corner_uv : (m, 3, 2) array_like, optional
         Texture coordinates of the corners of the faces; ``.obj`` only. They may differ at one
         vertex (seam).
@@ -104,10 +106,8 @@ def write(
         cell_data=storable(suffix, checked(cell_data, len(elements), "cell_data")),
         corner_uv=checked_uv(corner_uv, suffix, elements),
     )
-    if suffix in _WITHOUT_DATA and (arrays.point_data or arrays.cell_data):
-        names = [*arrays.point_data, *arrays.cell_data]
-        _log.info("%s holds no arrays, left out: %s", path, ", ".join(names))
-        arrays = MeshArrays(arrays.V, arrays.F, arrays.T, corner_uv=arrays.corner_uv)
+    if suffix in WITHOUT_ARRAYS:
+        arrays = _without_arrays(path, arrays)
     with atomic_path(path) as temporary:
         if suffix in BY_MESHIO:
             try:
@@ -120,3 +120,21 @@ def write(
                     write_npz(file, arrays)
                 else:
                     _WRITERS[suffix](file, arrays)
+
+
+def _without_arrays(path: Path, arrays: MeshArrays) -> MeshArrays:
+    """The mesh with its references alone, or without them; a warning names what is left out."""
+    given = arrays.point_data, arrays.cell_data
+    if path.suffix.lower() == ".mesh":
+        held = "one array of regions"
+        (points, of_points), (cells, of_cells) = map(medit_refs, given)
+    else:
+        held, points, cells = "no arrays", {}, {}
+        of_points, of_cells = map(list, given)
+    left_out = dict.fromkeys([*of_points, *of_cells])
+    if left_out:
+        _log.warning(
+            "%s: %s files hold %s; left out: %s",
+            path, path.suffix.lower(), held, ", ".join(map(shown, left_out)),
+        )  # fmt: skip
+    return replace(arrays, point_data=points, cell_data=cells)

@@ -226,8 +226,9 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
             ``radial``; zero on the core) with ``seam_u`` and ``seam_v``, 1 for tets across which
             the angle jumps; further the fields of the input. :func:`load_map` reads them,
             too. ``.obj`` of a surface with angles: the source with (u, v) in turns as texture
-            coordinates. The other formats of :func:`stretchmap.write` hold no arrays and get the
-            image itself, of a solid where they can hold one and of its surface where not.
+            coordinates. The other formats of :func:`stretchmap.write` get the image itself, of a
+            solid where they can hold one and of its surface where not, with the fields of the
+            input and ``ratio`` where they hold arrays.
 
         Raises
         ------

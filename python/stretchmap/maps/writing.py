@@ -9,6 +9,7 @@ no file behind.
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,16 +19,23 @@ from numpy.typing import NDArray
 
 from .. import io
 from ..base.files import atomic_path
+from ..base.options import shown
 from ..base.torus import TWO_PI, Torus
+from ..io.formats import WITHOUT_ARRAYS
 from ..io.npz import save_npz
+from ..io.ply import require_names
 from ..io.storable import storable
 from ..mesh.exchange import Cells
 from ..mesh.meshes import TetMesh, TriMesh
+from .fields import OF_MAPS
 from .frames import coordinate_field, periodic
 
 __all__ = ["all_fields", "corner_turns", "elements", "require_storable", "save_arrays", "write_map"]
 
-# Formats whose files of maps hold the source with all fields, beside those of ours.
+_log = logging.getLogger("stretchmap")
+
+# Formats whose files of maps hold the source with all fields, beside those of ours. Others hold the
+# image with the fields of the input.
 _WITH_FIELDS = (".vtu", ".vtk", ".xdmf")
 
 
@@ -42,19 +50,34 @@ def write_map(
     suffix = path.suffix.lower()
     if suffix in _WITH_FIELDS:
         io.write(path, mesh, point_data=given.point_data, cell_data=given.cell_data)
-    elif isinstance(mesh, TetMesh):
+        return
+    points, cells = (
+        {name: array for name, array in data.items() if name not in OF_MAPS}
+        for data in (given.point_data, given.cell_data)
+    )
+    ratios = {} if suffix in WITHOUT_ARRAYS else {"ratio": given.cell_data["ratio"]}
+    if isinstance(mesh, TetMesh):
         if suffix in io.suffixes(solid=True):
-            ratios = {"ratio": given.cell_data["ratio"]}
-            io.write(path, TetMesh(image, mesh.T), cell_data=ratios)
-        else:
-            io.write(path, TriMesh(image[mesh.boundary_vertices], mesh.surface.F))
+            io.write(path, TetMesh(image, mesh.T), points, cells | ratios)
+            return
+        ids = mesh.boundary_vertices
+        if cells:
+            names = ", ".join(map(shown, cells))
+            _log.warning("%s: %s files hold no tets; left out: %s", path, suffix, names)
+        points = {name: array[ids] for name, array in points.items()}
+        io.write(path, TriMesh(image[ids], mesh.surface.F), points)
     elif suffix == ".obj" and angles is not None:
-        io.write(path, mesh, corner_uv=corner_turns(mesh.F, angles))
+        io.write(path, mesh, points, cells, corner_turns(mesh.F, angles))
     else:
-        io.write(path, TriMesh(image, mesh.F), cell_data={"ratio": given.cell_data["ratio"]})
+        io.write(path, TriMesh(image, mesh.F), points, cells | ratios)
 
 
-def require_storable(path: Path, *fields: Mapping[str, NDArray[Any]]) -> None:
+def require_storable(
+    path: Path,
+    mesh: TriMesh | TetMesh,
+    points: Mapping[str, NDArray[Any]],
+    cells: Mapping[str, NDArray[Any]],
+) -> None:
     """Refuse fields of the source that the file of its map could not hold.
 
     Raises
@@ -63,8 +86,11 @@ def require_storable(path: Path, *fields: Mapping[str, NDArray[Any]]) -> None:
         Says what can be done.
     """
     suffix = path.suffix.lower()
-    for named in fields if suffix in _WITH_FIELDS else ():
-        storable(suffix, named)
+    if isinstance(mesh, TetMesh) and suffix not in io.suffixes(solid=True):
+        cells = {}  # its surface is written
+    points, cells = storable(suffix, points), storable(suffix, cells)
+    if suffix == ".ply":
+        require_names(points, cells)
 
 
 def save_arrays(

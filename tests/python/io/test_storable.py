@@ -10,7 +10,7 @@ import pytest
 import stretchmap as sm
 from stretchmap.errors import ArrayError
 from stretchmap.io import read_arrays, write
-from stretchmap.io.storable import storable
+from stretchmap.io.storable import medit_refs, storable
 
 TYPES = "? i1 u1 i2 u2 i4 u4 i8 u8 f2 f4 f8".split()
 NAMES = ["a label", "50%", "h%C3", 'T<300 & "x"', "höhe", "METADATA", "it's"]
@@ -134,3 +134,46 @@ def test_regions_go_into_msh_and_come_back(given, solid, tmp_path):
     assert len(np.unique(found["gmsh:geometrical"])) == 2  # else Gmsh takes both for one
     np.testing.assert_array_equal(found["heat"], [0.5, 1.5])
     np.testing.assert_array_equal(again.T, solid.T)
+
+
+@pytest.mark.parametrize(
+    ("names", "chosen"),
+    [
+        (["label", "gmsh:geometrical", "gmsh:physical", "medit:ref"], "medit:ref"),
+        (["label", "gmsh:geometrical", "gmsh:physical"], "gmsh:physical"),
+        (["parent_tet", "part"], "part"),
+        (["label"], "label"),
+        (["label", "other label"], None),
+    ],
+)
+@pytest.mark.parametrize("kind", ["i8", "u1"])
+def test_regions_go_into_medit_files_and_come_back(names, chosen, kind, solid, tmp_path, caplog):
+    pytest.importorskip("meshio")
+    regions = {name: np.array([7, 9 + k], kind) for k, name in enumerate(names)}
+    data = {"heat": np.array([0.5, 1.5]), **regions}
+    write(tmp_path / "a.mesh", solid, {"medit:ref": np.arange(5)}, data)
+    found = read_arrays(tmp_path / "a.mesh")
+    wanted = [1, 1] if chosen is None else regions[chosen]
+    np.testing.assert_array_equal(found.cell_data["medit:ref"], wanted)
+    np.testing.assert_array_equal(found.point_data["medit:ref"], np.arange(5))
+    rest = ", ".join(repr(name) for name in data if name != chosen)
+    (told,) = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    assert told.endswith(f"a.mesh: .mesh files hold one array of regions; left out: {rest}")
+
+
+def test_what_is_no_reference_is_left_out():
+    for array in ([0.0, 1.0], [True, False], [2**31, 0], [-(2**31) - 1, 0], [[1, 2], [3, 4]]):
+        assert medit_refs({"medit:ref": np.array(array)}) == ({}, ["medit:ref"])
+    refs, left_out = medit_refs({"label": np.array([[-(2**31)], [2**31 - 1]])})
+    np.testing.assert_array_equal(refs["medit:ref"], [-(2**31), 2**31 - 1])
+    assert not left_out
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".stl"])
+def test_formats_without_arrays_name_what_they_leave_out(suffix, solid, tmp_path, caplog):
+    surface = solid.surface
+    write(tmp_path / f"t{suffix}", surface)
+    assert not caplog.records
+    write(tmp_path / f"t{suffix}", surface, {"a": surface.V}, {"a": surface.F, "b": surface.F})
+    (told,) = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    assert told.endswith(f"t{suffix}: {suffix} files hold no arrays; left out: 'a', 'b'")

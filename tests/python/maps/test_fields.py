@@ -14,6 +14,7 @@ import stretchmap as sm
 from stretchmap.cli import main
 from stretchmap.errors import ArrayError, FileFormatError
 from stretchmap.io import read_arrays
+from stretchmap.maps.writing import require_storable
 
 pytest.importorskip("meshio")
 
@@ -105,6 +106,47 @@ def test_fields_come_back_from_files(suffix, coarse, tmp_path):
     again = tmp_path / "again.vtu"
     loaded.save(again)
     assert set(read_arrays(again).point_data) == set(carried.as_cells().point_data)
+
+
+def test_files_of_the_image_have_the_fields_of_the_input(coarse, tmp_path, caplog):
+    points, cells = given(coarse)
+    carried = coarse.with_fields(points, cells)
+    fields, groups = carried.point_fields, carried.cell_fields["gmsh:physical"]
+    carried.save(tmp_path / "a.msh")
+    found = read_arrays(tmp_path / "a.msh")
+    np.testing.assert_array_equal(found.V, coarse.image)
+    np.testing.assert_array_equal(found.point_data["load"], fields["load"])
+    np.testing.assert_array_equal(found.cell_data["ratio"], coarse.distortion.ratios)
+    np.testing.assert_array_equal(found.cell_data["gmsh:physical"], groups)
+    assert not caplog.records
+    left_out = {
+        ".mesh": "hold one array of regions; left out: 'height', 'load', 'density'",
+        ".ply": "hold no tets; left out: 'gmsh:physical', 'density'",
+    }
+    for suffix, said in left_out.items():
+        caplog.clear()
+        carried.save(tmp_path / f"a{suffix}")
+        assert [r.getMessage().partition("files ")[2] for r in caplog.records] == [said]
+    np.testing.assert_array_equal(read_arrays(tmp_path / "a.mesh").cell_data["medit:ref"], groups)
+    ids = coarse.mesh.boundary_vertices
+    found = read_arrays(tmp_path / "a.ply")
+    np.testing.assert_array_equal(found.point_data["height"], fields["height"][ids])
+    caplog.clear()
+    for suffix in (".mesh", ".ply", ".stl"):
+        coarse.save(tmp_path / f"b{suffix}")
+    assert not caplog.records
+
+
+def test_names_that_ply_does_not_take_are_refused_beforehand(coarse, tmp_path):
+    solid, surface = coarse.mesh, coarse.mesh.surface
+    for mesh, points, cells in ((solid, {"x": 1}, {}), (surface, {}, {"höhe": 1})):
+        with pytest.raises(ArrayError, match="rename it"):
+            require_storable(tmp_path / "a.ply", mesh, *map(rows, (points, cells)))
+    require_storable(tmp_path / "a.ply", solid, {}, rows({"höhe": 1}))  # its tets are not written
+
+
+def rows(data: dict[str, int]) -> dict[str, np.ndarray]:
+    return {name: np.array([value]) for name, value in data.items()}
 
 
 @pytest.mark.parametrize("suffix", VIEWERS[:2])
