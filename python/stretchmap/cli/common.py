@@ -85,6 +85,7 @@ def read_mesh(path: Path, orient: bool = False, compact: bool = False) -> TriMes
 def read_with_fields(path: Path, orient: bool, compact: bool) -> tuple[TriMesh | TetMesh, Fields]:
     """As `read_mesh`, and the data of its points and cells."""
     from .. import io
+    from ..maps.fields import is_saved
     from ..mesh.meshes import TetMesh, TriMesh
 
     arrays = io.read_arrays(path)
@@ -96,7 +97,8 @@ def read_with_fields(path: Path, orient: bool, compact: bool) -> tuple[TriMesh |
     if compact:
         mesh, kept = mesh.compact()
         points = {name: array[kept] for name, array in points.items()}
-    saved = "image" in points  # a map: of what it holds itself the new one has its own
+    # Of what a map holds itself the new one has its own.
+    saved = is_saved([*points, *arrays.cell_data, *arrays.extra])
     return mesh, (_carried(points, saved), _carried(arrays.cell_data, saved))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..mesh.halved_faces import SurfaceRefinement
 from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.refinement import Refinement
 
-__all__ = ["OF_MAPS", "carried"]
+__all__ = ["OF_MAPS", "carried", "is_saved"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -28,6 +28,15 @@ OF_MAPS = frozenset(
     "parent_tet parent_face landmarks forms u v s cos_u sin_u cos_v sin_v grad_u grad_v grad_s "
     "along around radial seam_u seam_v converged".split()
 )
+# What every file of a map, for viewers, of our own and of its parts, holds together.
+_IN_ALL = ({"image", "ring_ratio", "ratio"}, {"image", "ring_ratios", "ratios", "meta"},
+           {"image", "part", "parent_tet"})  # fmt: skip
+
+
+def is_saved(names: Collection[str]) -> bool:
+    """Whether a file with arrays of these names was written by a map or a partition: one of its
+    names alone others use, too."""
+    return any(together <= set(names) for together in _IN_ALL)
 
 
 def carried(

@@ -8,17 +8,39 @@ import pytest
 import stretchmap as sm
 from command_line import failing
 from stretchmap.cli import main
+from stretchmap.cli.common import read_with_fields
 from stretchmap.io import read_arrays
 
 pytest.importorskip("typer")
 
 
-def test_fields_of_a_saved_map_are_not_carried_along(folder, capsys):
+@pytest.mark.parametrize("suffix", [".vtu", ".npz"])
+def test_fields_of_a_saved_map_are_not_carried_along(suffix, folder, capsys):
     pytest.importorskip("meshio")
-    assert main(["conformal", "surface.ply", "-o", "map.vtu", "-q"]) == 0
-    assert {"u", "v"} <= sm.io.read_arrays("map.vtu").point_data.keys()
-    assert main(["conformal", "map.vtu", "-o", "again.vtu", "-q"]) == 0
+    assert main(["conformal", "surface.ply", "-o", f"map{suffix}", "-q"]) == 0
+    own = "u" if suffix == ".vtu" else "angles"
+    assert own in sm.io.read_arrays(f"map{suffix}").point_data
+    assert main(["conformal", f"map{suffix}", "-o", "again.vtu", "-q"]) == 0
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".npz"])
+def test_an_image_alone_makes_no_saved_map(suffix, folder, capsys):
+    pytest.importorskip("meshio")
+    surface = sm.read("surface.ply")
+    x = surface.V[:, 0]
+    sm.write(f"flow{suffix}", surface, {"image": x, "u": x}, {"ratio": surface.face_areas})
+    assert main(["conformal", f"flow{suffix}", "-o", "map.vtu", "-q"]) == 0
+    said = capsys.readouterr().err
+    assert "left out: image, u;" in said and "left out: ratio;" in said
+
+
+def test_fields_of_parts_of_a_map_are_not_carried_along(tmp_path):
+    ring = sm.samples.solid_torus(600)
+    np.savez(tmp_path / "map.npz", V=ring.V, T=ring.T, image=ring.V, torus=[2.0, 1.0])
+    sm.partition(sm.load_map(tmp_path / "map.npz"), 2).save(tmp_path / "parts.npz")
+    _, (points, cells) = read_with_fields(tmp_path / "parts.npz", orient=False, compact=False)
+    assert not points and list(cells) == ["part"]
 
 
 def test_fields_named_like_those_of_maps_are_left_out_with_a_word(folder, capsys):
