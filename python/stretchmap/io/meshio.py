@@ -42,6 +42,14 @@ _ANNOUNCED = {
     "vtk": rb"(?m)^CELL_TYPES[ \t]+(\d{1,18})\b",
     "vtu": rb"NumberOfCells=[\"'](\d{1,18})[\"']",
 }
+# What a file should be, where meshio gives up on it without a reason.
+_FORMATS = {
+    "gmsh": "in Gmsh's format",
+    "medit": "in Medit's text format",
+    "vtk": "in VTK's legacy format",
+    "vtu": "an unstructured grid in VTK's XML format",
+    "xdmf": "in the format XDMF",
+}
 # Characters of names that VTK does not encode in its .vtk files.
 _PRINTED = "".join(chr(code) for code in range(33, 127) if chr(code) not in '"%')
 # What opens the list of points.
@@ -76,7 +84,7 @@ def read_meshio(path: Path, file_format: str) -> MeshArrays:
         meshio, or what it needs for this format, is not installed.
     """
     meshio = _import(f"reading {path.suffix} files")
-    with _guarded(path):
+    with _guarded(path, f"it is damaged, or not {_FORMATS[file_format]} as meshio reads it"):
         mesh = meshio._helpers.reader_map[file_format](str(path))
     _require_all(path, file_format, sum(len(block.data) for block in mesh.cells))
     read_as = unquote if file_format == "vtk" else str
@@ -97,7 +105,7 @@ def write_meshio(path: Path, mesh: MeshArrays, file_format: str) -> None:
     if file_format == "gmsh" and not cell_data.keys().isdisjoint(GMSH_TAGS):
         # Of version 4.1 meshio writes regions only where each has points of its own.
         file_format, cell_data = "gmsh22", _with_both_tags(cell_data)
-    with _guarded(path, (OSError, MemoryError)):
+    with _guarded(path, "meshio fails without a reason", (OSError, MemoryError)):
         out = meshio.Mesh(
             mesh.V,
             [(kind, mesh.elements)],
@@ -173,8 +181,9 @@ class _Log:
 
 
 @contextlib.contextmanager
-def _guarded(path: Path, system: tuple[type[Exception], ...] = ()) -> Iterator[None]:
-    """Log what meshio prints; catch every way it fails, but for what is no fault of the file."""
+def _guarded(path: Path, unsaid: str, system: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Log what meshio prints; catch every way it fails, but for what is no fault of the file. Where
+    it does not say why, or by a byte alone, the reason is ``unsaid``."""
     mark = _ours.set(True)
     try:
         with np.errstate(all="ignore"), _to_the_end():
@@ -186,8 +195,9 @@ def _guarded(path: Path, system: tuple[type[Exception], ...] = ()) -> Iterator[N
     except system:
         raise
     except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise FileFormatError(reason) from error
+        silent = isinstance(error, (SystemExit, UnicodeDecodeError))
+        reason = "" if silent else " ".join(str(error).split())
+        raise FileFormatError(reason or unsaid) from error
     finally:
         _ours.reset(mark)
 

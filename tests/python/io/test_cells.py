@@ -251,6 +251,25 @@ def test_arrays_of_every_kind_as_pyvista_saves_them(suffix, tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize(
+    ("suffix", "data", "wanted"),
+    [
+        (".vtu", b"this is no mesh", "an unstructured grid in VTK's XML format"),
+        (".vtk", b"\x89PNG", "in VTK's legacy format"),
+        (".mesh", b"<html></html>", "in Medit's text format"),
+        (".xdmf", b"<html></html>", "in the format XDMF"),
+        (".msh", b"this is no mesh", "in Gmsh's format"),
+    ],
+)
+def test_what_meshio_gives_up_on_in_silence_is_explained(suffix, data, wanted, tmp_path):
+    pytest.importorskip("meshio")
+    path = tmp_path / f"t{suffix}"
+    path.write_bytes(data)
+    message = f"{suffix} cannot be read: it is damaged, or not {wanted} as meshio reads it$"
+    with pytest.raises(FileFormatError, match=message):
+        read_arrays(path)
+
+
+@pytest.mark.parametrize(
     ("version", "line", "found"),
     [
         (b"5.1", b"SCALARS part unsigned_char", True),
