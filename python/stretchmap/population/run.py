@@ -19,7 +19,7 @@ from ..base.arrays import read_only
 from ..base.files import atomic_path
 from ..base.options import as_path, callback, flag, one_of, real, shown, whole
 from ..base.progress import Progress, report
-from ..errors import OptionError, SolverError, StretchmapError
+from ..errors import LandmarkError, OptionError, SolverError, StretchmapError
 from ..io.npz import save_npz
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
@@ -32,7 +32,7 @@ from .procrustes import generalized_procrustes
 from .result import Population
 from .run_folder import prepare_folder
 from .shape_model import shape_model
-from .shapes import Shape, gather_landmarks, gather_shapes
+from .shapes import Shape, gather_landmarks, gather_shapes, require_landmarks
 from .task import Job, Record, failed, run_job
 
 __all__ = ["fit"]
@@ -106,6 +106,8 @@ def fit(
     OptionError
         An option out of range, names that are not unique, or a folder that holds another run or
         the shapes.
+    LandmarkError
+        A folder has landmarks of fewer than two shapes.
     SolverError
         Fewer than two shapes could be mapped; the message has the first reason.
     CertificationError
@@ -142,6 +144,7 @@ def fit(
                 f"the run folder {shown(str(folder))} is that of the shapes: what a run leaves "
                 "would be taken for shapes; name another one"
             )
+    require_landmarks(shapes)
     solid, marks, chosen = _start(shapes, template, landmarks)
     # Where all corners of a tet lie on the boundary only new vertices inside can keep it upright;
     # put in once they are in every map and in the mean.
@@ -165,13 +168,21 @@ def _start(
 ) -> tuple[TetMesh, Array | None, str | None]:
     """The first template, its landmarks, and its digest unless it is the default."""
     if template is None:
-        reasons = []
+        reasons, unmarked = [], []
         for shape in shapes:
             try:
                 return shape.load(), shape.load_landmarks(), None
+            except LandmarkError:
+                unmarked.append(shape.name)
             except (StretchmapError, OSError) as error:
                 reasons.append(f"{shape.name}: {error}")
-        raise SolverError(f"no shape can be read; {reasons[0]}")
+        why = reasons[:1]
+        if unmarked:
+            names = f"{', '.join(unmarked[:5])}{', ...' if len(unmarked) > 5 else ''}"
+            why.append(
+                f"{len(unmarked)} of {len(shapes)} have no landmarks in {landmarks}: {names}"
+            )
+        raise SolverError(f"no shape can be read; {'; '.join(why)}")
     for shape in shapes:
         if isinstance(template, str) and shape.name == template:
             return shape.load(), shape.load_landmarks(), shape.digest()

@@ -23,7 +23,7 @@ from ..io.reading import read_solid
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 
-__all__ = ["Shape", "gather_landmarks", "gather_shapes"]
+__all__ = ["Shape", "gather_landmarks", "gather_shapes", "require_landmarks"]
 
 _log = logging.getLogger("stretchmap")
 
@@ -170,6 +170,25 @@ def gather_landmarks(shapes: list[Shape], landmarks: Any) -> list[Shape]:
     if all(not isinstance(mark, Path) and not len(mark) for mark in marks):
         return shapes
     return [Shape(s.name, s.source, mark) for s, mark in zip(shapes, marks, strict=True)]
+
+
+def require_landmarks(shapes: Sequence[Shape]) -> None:
+    """Refuse shapes of which fewer than two have the landmarks that are looked for in a folder.
+
+    Raises
+    ------
+    LandmarkError
+        Says how many have none, and where they would be.
+    """
+    files = [shape.landmarks for shape in shapes if isinstance(shape.landmarks, Path)]
+    missing = [file for file in files if not file.is_file()]
+    if missing and len(files) - len(missing) < 2:
+        more = ", ..." if len(missing) > 5 else ""
+        raise LandmarkError(
+            f"{len(missing)} of {len(files)} shapes have no landmarks, two shapes with them are "
+            f"needed; in {missing[0].parent} there is no "
+            f"{', '.join(file.name for file in missing[:5])}{more}"
+        )
 
 
 def _shape(entry: Any, name: str) -> Shape:
