@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from enum import Enum
+from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
+from zipfile import BadZipFile
 
 import typer
 
@@ -99,6 +101,7 @@ def population(
             progress=bar,
         )
     shapes, mean, page = (output / name for name in _RESULTS)
+    _warn_of_coarser(shapes, found)
     found.save(shapes)
     write(mean, found.mean)
     write_population_report(found, page, str(solids.name))
@@ -110,6 +113,30 @@ def population(
     for name in found.skipped:
         _log.error("%s was skipped", name)
     return 1 if found.skipped or not found.converged else 0
+
+
+def _warn_of_coarser(path: Path, found: Population) -> None:
+    """Say so where the result of more rounds with the same shapes is replaced.
+
+    A folder is that of its shapes and settings: of two such results the one of more rounds is the
+    same run carried on.
+    """
+    import numpy as np
+
+    try:
+        with np.load(path) as data:
+            before = loads(str(data["meta"]))
+        names = tuple(record["name"] for record in before["shapes"] if record["ok"])
+        rounds, moved = int(before["rounds"]), float(before["moved"][-1])
+    except (OSError, ValueError, LookupError, TypeError, BadZipFile):
+        return  # there is none, or none that can be read
+    if names == found.names and rounds > len(found.moved):
+        _log.warning(
+            "%s held the result of %d rounds, the last of which moved the template by %.2g, and is "
+            "replaced by that of %d, by %.2g; all maps are kept: a smaller --tol or more "
+            "--max-rounds brings the finer one back",
+            path, rounds, moved, len(found.moved), found.moved[-1],
+        )  # fmt: skip
 
 
 def _list_shapes(found: Population) -> None:

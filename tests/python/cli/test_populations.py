@@ -51,6 +51,36 @@ def test_a_folder_of_bones(folder, tmp_path, capsys):
     assert "other settings" in capsys.readouterr().err
 
 
+def test_a_finer_result_is_not_replaced_in_silence(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("stretchmap.plot.population_report.write_population_report", lambda *_: 0)
+    bones, marks = tmp_path / "bones", tmp_path / "marks"
+    bones.mkdir()
+    marks.mkdir()
+    population = sm.samples.vertebra_population(6, seed=2, n_tets=600)
+    for i in range(2):  # by landmarks no pose is searched for
+        sm.write(bones / f"bone{i}.npz", population.solids[i])
+        np.savetxt(marks / f"bone{i}.csv", population.landmarks[i], delimiter=",")
+    out = tmp_path / "run"
+
+    def result(*stop):
+        run("population", bones, "-o", out, "-q", "--landmarks", marks, *stop)
+        lines = capsys.readouterr().err.splitlines()
+        return data_of(out), [line for line in lines if "held the result" in line]
+
+    finer, told = result("--tol", 0, "--max-rounds", 2)
+    assert not told
+    maps = {path: path.stat().st_mtime_ns for path in (out / "maps").iterdir()}
+    coarser, (line,) = result("--tol", 1)
+    assert "held the result of 2 rounds" in line and "replaced by that of 1," in line
+    assert not np.array_equal(coarser["correspondences"], finer["correspondences"])
+    back, told = result("--tol", 0, "--max-rounds", 2)
+    assert not told
+    np.testing.assert_array_equal(back["correspondences"], finer["correspondences"])
+    assert maps == {path: path.stat().st_mtime_ns for path in (out / "maps").iterdir()}
+    (out / "population.npz").write_bytes(b"damaged")
+    assert not result("--tol", 1)[1]
+
+
 def data_of(out):
     with np.load(out / "population.npz") as data:
         return dict(data)
