@@ -211,3 +211,54 @@ def test_faces_of_a_mask_are_made_outwards(mirrored):
     """Turned afterwards, they would be reported as if the mask had been inside out."""
     V, F, _ = mask_surface(lopsided_mask(), OBLIQUE @ np.diag([mirrored, 1.0, 1.0, 1.0]))
     assert part_sheets(V, F)[2]["turned"] == 0
+
+
+def ring(tube: float) -> np.ndarray:
+    x, y, z = np.indices((31, 31, 11)) - np.array([15, 15, 5])[:, None, None, None]
+    return np.hypot(np.hypot(x, y) - 10.0, z) < tube
+
+
+@pytest.mark.parametrize("tube", [1.6, 2.0, 2.5, 3.5])
+def test_smoothing_keeps_the_volume_of_thin_masks(tube):
+    """It had taken a quarter of a tube with a radius of 1.6 voxels, and a twentieth at 3.5."""
+    mask = ring(tube)
+    V, F, counts = mask_surface(mask, OBLIQUE)
+    surface = sm.TriMesh(V, F)
+    surface.require_genus_one()
+    volume = mask.sum() * abs(np.linalg.det(OBLIQUE[:3, :3]))
+    assert surface.volume == pytest.approx(volume, rel=0.035)
+    assert counts["voxels_kept"] == mask.sum()
+
+
+def test_volume_gained_by_smoothing_is_taken_back():
+    """Bores are concave: smoothing narrows them."""
+    mask = np.zeros((34, 34, 12), bool)
+    mask[2:32, 2:32, 2:10] = True
+    for i, j in np.ndindex(7, 7):
+        mask[4 + 4 * i : 6 + 4 * i, 4 + 4 * j : 6 + 4 * j] = False
+    V, F, _ = mask_surface(mask, np.eye(4), 49)
+    surface = sm.TriMesh(V, F)
+    assert surface.genus == 49
+    assert surface.volume == pytest.approx(mask.sum(), rel=0.035)
+
+
+def test_no_volume_is_kept_at_the_cost_of_a_handle():
+    """The gap of an open ring is one voxel wide; it would close where more is enclosed."""
+    mask = ring(2.0)
+    mask[15:, 15] = False
+    V, F, _ = mask_surface(mask, np.eye(4))
+    surface = sm.TriMesh(V, F)
+    assert surface.genus == 0
+    assert 0.85 < surface.volume / mask.sum() < 0.96
+
+
+def test_volume_lost_is_told_of_the_voxels(caplog):
+    """A lump on a bar one voxel wide: smoothing parts it, and it is dropped as debris."""
+    mask = np.zeros((26, 12, 7), bool)
+    mask[:14] = drilled(2)
+    mask[12:17, 4, 3] = True
+    mask[17:21, 3:7, 2:4] = True
+    done = sm.prepare(mask, faces=800)
+    told = done.steps[-1].counts["percent_of_volume_lost"]
+    assert told == pytest.approx(100.0 * (1.0 - done.solid.volume / mask.sum()), abs=0.01)
+    assert told > 10.0 and "of the volume is lost" in caplog.text
