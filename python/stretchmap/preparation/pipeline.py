@@ -30,7 +30,7 @@ from .handles import HandleCut, cut_handles
 from .holes import close_holes, crossings, remove_crossings
 from .rebuild import rebuilt
 from .report import Preparation, Step
-from .soup import Faces, Points, keep_largest, part_sheets, weld
+from .soup import Faces, Points, keep_largest, part_sheets, weld_borders
 from .voxels import as_affine, mask_surface
 from .wild import chosen_filler, fill_within_envelope, has_ftetwild
 
@@ -111,7 +111,8 @@ def prepare(
     KindError, ArrayError, NonFiniteError
         Neither a surface nor a mask, or an affine that is singular or none.
     ConnectivityError
-        Two pieces too large to be debris.
+        Two pieces too large to be debris, or triangles that share no vertices and are too far apart
+        to be welded.
     GenusError
         Fewer handles than wanted, or one too many that is longer than ``max_cut`` allows.
     SelfIntersectionError
@@ -155,7 +156,7 @@ def prepare(
                 "spacing and affine are those of the voxels of a mask, a surface has none"
             )
         V, F = raw.V, raw.F
-    V, F = run.arrays("weld", weld, V, F, _WELD * float(np.ptp(V, axis=0).max()))
+    V, F = run.arrays("weld", weld_borders, V, F, _WELD * float(np.ptp(V, axis=0).max()))
     if not len(F):
         raise DegenerateError("the surface has no face of any size: all its points lie together")
     V, F = run.arrays("orient", part_sheets, V, F)

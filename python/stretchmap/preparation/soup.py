@@ -19,6 +19,7 @@ from ..errors import ConnectivityError
 
 __all__ = [
     "LARGEST_DEBRIS", "compacted", "components", "keep_largest", "labels", "part_sheets", "weld",
+    "weld_borders",
 ]  # fmt: skip
 
 Points = NDArray[np.float64]
@@ -26,6 +27,9 @@ Faces = NDArray[np.int32]
 
 # Two pieces are debris and body only if their areas, or numbers of voxels, are farther apart.
 LARGEST_DEBRIS = 0.3
+_COARSER = 3.0  # each tolerance for borders, times the one before
+_SHARE_OF_EDGE = 0.1  # of the median edge, that no tolerance reaches
+_LOST = 1e-3  # of the faces at borders, may be lost by a larger tolerance
 
 
 def weld(V: Points, F: Faces, tolerance: float) -> tuple[Points, Faces, dict[str, int]]:
@@ -45,8 +49,89 @@ def weld(V: Points, F: Faces, tolerance: float) -> tuple[Points, Faces, dict[str
         ``welded`` vertices, ``collapsed`` faces (a vertex twice), ``copies`` of faces.
     """
     points, ids = np.unique(V + 0.0, axis=0, return_inverse=True)
-    faces: NDArray[Any] = ids.reshape(-1)[F]
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    faces = ids.reshape(-1)[F]
+    V, G, counts = _welded(points, faces, _close_pairs(points, tolerance))
+    counts["welded"] += len(np.unique(F)) - len(np.unique(faces))
+    return V, G, counts
+
+
+def weld_borders(V: Points, F: Faces, tolerance: float) -> tuple[Points, Faces, dict[str, float]]:
+    """Weld, and vertices on borders also where they are farther apart, as far as that is safe.
+
+    Corners that differ by noise leave cracks or a soup of single triangles. So the tolerance grows
+    to at most a tenth of the median edge, as long as hardly a face is lost. A larger one is taken
+    only where it leaves no border edges, or at most half as many as any smaller one.
+
+    Parameters
+    ----------
+    V : (n, 3) ndarray
+    F : (m, 3) ndarray of int32
+    tolerance : float
+        The first one, for all vertices.
+
+    Returns
+    -------
+    V, F : ndarrays
+    counts : dict
+        As of `weld`, and the ``tolerance`` where a larger one was taken.
+
+    Raises
+    ------
+    ConnectivityError
+        No two faces share an edge in most places all the same.
+    """
+    V, F, first = weld(V, F, tolerance)
+    best: tuple[Points, Faces, dict[str, float]] = V, F, {**first}
+    borders, n_edges = _border_edges(F)
+    if not len(borders):
+        return best
+    among = np.unique(borders)
+    most_lost = _LOST * np.count_nonzero(np.isin(F, among).any(axis=1))
+    limit = _SHARE_OF_EDGE * float(np.median(np.linalg.norm(V[F] - V[np.roll(F, 1, 1)], axis=2)))
+    left = len(borders)
+    while left and (tolerance := _COARSER * tolerance) < limit:
+        pairs = among[_close_pairs(V[among], tolerance)]
+        if not len(pairs):
+            continue
+        W, G, more = _welded(V, F, pairs)
+        if more["collapsed"] + more["copies"] > most_lost:
+            break
+        borders, n = _border_edges(G)
+        if 2 * len(borders) <= left:
+            left, n_edges = len(borders), n
+            best = W, G, {**{k: first[k] + more[k] for k in first}, "tolerance": tolerance}
+    if 2 * left > n_edges:
+        raise ConnectivityError(
+            f"{left} of {n_edges} edges belong to one face only: the triangles do not share "
+            "vertices, and those that should be one are too far apart to be told from others; "
+            "weld them with a tolerance of your own, or export the surface with shared vertices"
+        )
+    return best
+
+
+def _border_edges(F: Faces) -> tuple[NDArray[Any], int]:
+    """Edges of one face, as pairs of vertices, and the number of all."""
+    if not len(F):
+        return np.zeros((0, 2), np.int64), 0
+    one, other = F.ravel().astype(np.int64), np.roll(F, -1, axis=1).ravel()
+    base = int(F.max()) + 1
+    key, count = np.unique(
+        np.minimum(one, other) * base + np.maximum(one, other), return_counts=True
+    )
+    single = key[count == 1]
+    return np.stack([single // base, single % base], axis=1), len(key)
+
+
+def _close_pairs(points: Points, tolerance: float) -> NDArray[np.int64]:
+    pairs: NDArray[np.int64] = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    return pairs
+
+
+def _welded(
+    points: Points, F: NDArray[Any], pairs: NDArray[np.int64]
+) -> tuple[Points, Faces, dict[str, int]]:
+    """Weld pairs of points, which all differ."""
+    faces = F
     if len(pairs):
         label = labels(len(points), pairs[:, 0], pairs[:, 1])
         first = np.unique(label, return_index=True)[1]

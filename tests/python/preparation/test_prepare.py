@@ -34,7 +34,7 @@ from stretchmap.preparation.even import even
 from stretchmap.preparation.handles import cut_handles
 from stretchmap.preparation.holes import close_holes, crossings, remove_crossings
 from stretchmap.preparation.rebuild import winding_mask
-from stretchmap.preparation.soup import keep_largest, part_sheets, weld
+from stretchmap.preparation.soup import keep_largest, part_sheets, weld, weld_borders
 from stretchmap.preparation.voxels import mask_surface, read_mask
 
 RAW = ct_like.Damage(holes=4, islands=5, inside_out=True, exploded=True)
@@ -150,6 +150,47 @@ def test_weld_joins_what_is_close_and_drops_what_collapses():
     V, F, counts = weld(V, np.vstack([F, F[:1], [[0, 0, 1]]]), 1e-6)
     assert (len(V), len(F)) == (torus.n_vertices, torus.n_faces)
     assert (counts["collapsed"], counts["copies"]) == (1, 1)
+
+
+def exploded(noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """A torus, edges from 0.36 to 1.1 long, every triangle with corners of its own."""
+    torus = samples.torus_surface(24, 16)
+    V = torus.V[torus.F].reshape(-1, 3)
+    V = V + noise * np.random.default_rng(0).normal(size=V.shape)
+    return V, np.arange(len(V), dtype=np.int32).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-4, 3e-3])
+def test_corners_that_noise_moved_apart_are_welded(noise):
+    V, F, counts = weld_borders(*exploded(noise), 1e-7)
+    torus = samples.torus_surface(24, 16)
+    assert (len(V), len(F)) == (torus.n_vertices, torus.n_faces)
+    assert noise < counts["tolerance"] < 20.0 * noise
+    assert (counts["welded"], counts["collapsed"]) == (3 * len(F) - len(V), 0)
+    sm.TriMesh(V, F).require_closed()
+
+
+def test_corners_too_far_apart_are_refused():
+    with pytest.raises(ConnectivityError, match="2304 of 2304 edges belong to one face only"):
+        sm.prepare(sm.TriMesh(*exploded(0.1)), faces=500)
+
+
+def test_borders_are_welded_no_farther_than_needed():
+    """A crack is closed, a hole stays one, sheets next to each other stay apart."""
+    torus = samples.torus_surface(24, 16)
+    V = np.vstack([torus.V, torus.V[:40] + 1e-4])
+    F = torus.F.copy()
+    low = (F < 40).all(axis=1)
+    F[low] += torus.n_vertices
+    W, G, counts = weld_borders(V, F, 1e-7)
+    assert (len(W), len(G)) == (torus.n_vertices, torus.n_faces) and counts["tolerance"] < 1e-3
+    _, G, counts = weld_borders(torus.V, torus.F[3:], 1e-7)
+    assert len(G) == torus.n_faces - 3 and "tolerance" not in counts
+    inner = torus.V * (1.0 - 1e-5)
+    W, _, counts = weld_borders(
+        np.vstack([torus.V, inner]), np.vstack([torus.F, torus.F + len(inner)]), 1e-7
+    )
+    assert len(W) == 2 * len(inner) and not any(counts.values())
 
 
 def test_sheets_that_touch_are_parted():
