@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import math
 import time
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..base.progress import Progress
 from ..base.torus import TWO_PI, Torus
@@ -15,7 +19,7 @@ from .finer import ROUND_STEPS, STEPS_LEFT, Finer, goal, mapped_finer
 from .finish import cut_short, finish_areas
 from .result import AreaMap, mapped, moved, n_folded
 from .route import EASING, EqualAreas, Made, Route, best_turns, follow
-from .search import search_phase
+from .search import Ratio, search_phase
 from .work import Work
 
 _log = logging.getLogger("stretchmap")
@@ -30,6 +34,8 @@ _COARSELY = 3.0
 _AT_ONCE = 0.6  # share of all faces that there may be, that this may take
 # Share of the work left for the surface as it is, until no face of a finer one is folded.
 _RESERVED = 0.25
+# Below it, areas tell of the ratio: tried first, so many times in all, and a step's most.
+_SENSITIVE, _FATTER, _RATIOS, _FARTHEST = 1.1, 0.9, 5, 0.3
 
 
 @dataclass(frozen=True)
@@ -69,6 +75,8 @@ class Finest:
             if finer is not None and finer.certificate.certified:
                 return finer
         found = self._along(alone=not coarse)
+        if self.route.ratio == "search" and found.ratio < _SENSITIVE:
+            found = self._by_ratio(found)
         unfinished = not self._good(found) or cut_short(found.stop_reason)
         if finer is None and refine and unfinished and not n_folded(found):
             level = Level.of(level.surface, found.angles / TWO_PI, level.forms, level.aspect)
@@ -83,6 +91,28 @@ class Finest:
         if not found.certificate.certified:
             return finer
         return min(found, finer, key=lambda each: each.distortion.element_std)
+
+    def _by_ratio(self, found: AreaMap) -> AreaMap:
+        """With the ratio moved to where areas are right, if it does them good.
+
+        Near a ratio of one the error is a multiple of that of ``log(R / r - 1)``: a step shows
+        which way to go, and how far.
+        """
+        step, best = math.log(_FATTER), found
+        for _ in range(_RATIOS):
+            if best.converged or n_folded(best) or self.work.steps() < ROUND_STEPS:
+                break
+            route = dataclasses.replace(self.route, ratio=1.0 + (best.ratio - 1.0) * math.exp(step))
+            other = dataclasses.replace(self, route=route)._along(alone=True)
+            if n_folded(other):
+                break
+            before, after = (each.distortion.element_std for each in (best, other))
+            if after < before:
+                step, best = step * after / (before - after), other
+            else:
+                step *= -before / (before + after)
+            step = float(np.clip(step, -_FARTHEST, _FARTHEST))
+        return best
 
     @property
     def _wanted(self) -> float:
@@ -111,19 +141,34 @@ class Finest:
             turns, more = self.equal.eased(shape, turns)
             records = records + more
             work.spend_in_chart(len(more))
-            given = (self.route.phase, self.route.ratio)
-            phase, ratio, _ = search_phase(level.surface, turns, level.aspect, *given)
-            wrapped = Finer.wrapped(level, turns, phase, ratio)
-            wrapped = dataclasses.replace(wrapped, affordable=work.most_faces(STEPS_LEFT[0]))
-            finer = wrapped.fitted(_COARSELY, _AT_ONCE)
-            work.spend_on_fitting((finer.level.surface if finer else level.surface).n_faces)
-            if finer is not None:
+            fitted = [self._fitted(turns, wanted) for wanted in self._ratios]
+            there = [each for each in fitted if each is not None]
+            if there:
+                finer, phase = min(there, key=lambda each: each[0].level.surface.n_faces)
                 seconds = {"sem": time.perf_counter() - clock}
-                made = Made(finer.angles, phase, ratio, records, seconds=seconds)
+                made = Made(finer.angles, phase, finer.ratio, records, seconds=seconds)
                 found = self._finer(finer, made)
                 if found is not None:
                     return True, found
         return True, None
+
+    @property
+    def _ratios(self) -> tuple[Ratio | float, ...]:
+        """Those of which the one is taken that needs fewer faces."""
+        given = self.route.ratio
+        return ("conformal", "search") if given is None else (given,)
+
+    def _fitted(
+        self, turns: NDArray[np.float64], ratio: Ratio | float
+    ) -> tuple[Finer, float] | None:
+        """Edges halved that sag too much with that ratio, and the phase; None if too many do."""
+        level, work = self.equal.level, self.work
+        phase, ratio, _ = search_phase(level.surface, turns, level.aspect, self.route.phase, ratio)
+        wrapped = Finer.wrapped(level, turns, phase, ratio)
+        wrapped = dataclasses.replace(wrapped, affordable=work.most_faces(STEPS_LEFT[0]))
+        finer = wrapped.fitted(_COARSELY, _AT_ONCE)
+        work.spend_on_fitting((finer.level.surface if finer else level.surface).n_faces)
+        return None if finer is None else (finer, phase)
 
     def _finer(self, start: Finer, made: Made) -> AreaMap | None:
         """The map of a surface with edges halved, None if faces stay folded."""

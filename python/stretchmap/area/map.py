@@ -14,6 +14,7 @@ from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import MOST_ANGLE, MOST_RATIO, TWO_PI, Torus
 from ..conformal.map import ConformalMap, conformal_map
+from ..conformal.torus import conformal_torus
 from ..errors import CertificationError, OptionError
 from ..homology.basis import HomologyBasis
 from ..mesh.given import as_surface, require_same_mesh
@@ -33,6 +34,10 @@ __all__ = ["Finish", "area_map", "charted", "equal_areas", "finished", "turned"]
 
 _log = logging.getLogger("stretchmap")
 
+# Ratio of the conformal map below which the best one is searched for: where the hole of the torus
+# all but closes, a small error of the ratio costs areas.
+_FAT = 1.1
+
 
 @takes_threads
 def area_map(
@@ -42,7 +47,7 @@ def area_map(
     conformal: ConformalMap | None = None,
     torus: Torus | None = None,
     phase: float | None = None,
-    ratio: Ratio | float = "conformal",
+    ratio: Ratio | float | None = None,
     finish: Finish = "ring",
     max_iter: int = 100,
     tol: float = 5e-3,
@@ -73,9 +78,11 @@ def area_map(
         Torus to map onto, with its size and ratio of radii. Left out, it has the surface's area.
     phase : float, optional
         Turns to add to the equal-area coordinate around the tube; searched if left out.
-    ratio : "conformal", "search" or float
+    ratio : "conformal", "search" or float, optional
         ``R / r``: that of the conformal map, the best found by a search, or given, above 1 and at
-        most 1e6, beyond which coordinates are too coarse for the tube. Not together with ``torus``.
+        most 1e6, beyond which coordinates are too coarse for the tube. Left out, it is that of the
+        conformal map, but the best if that is below 1.1, and where many edges have to be halved,
+        if fewer are with the best. Not together with ``torus``.
     finish : "ring", "face" or "none"
         ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then, where
         their SD is at most twice ``tol``, a projection that makes the area of every vertex ring
@@ -206,6 +213,8 @@ def _found(
     equal = equal_areas(surface, conformal, progress, budget)
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
+    if route.ratio is None and conformal_torus(equal.level.aspect).ratio < _FAT:
+        route = dataclasses.replace(route, ratio="search")
     stack = levels(equal.level)
     work = Work.of(surface, budget, refine=refine)
     found = Finest(route, stack, equal, torus, work, progress).found(refine=refine)
@@ -290,18 +299,18 @@ def _level_of(found: AreaMap) -> Level:
 
 
 def _check_options(
-    torus: Torus | None, phase: float | None, ratio: str | float, finish: str
+    torus: Torus | None, phase: float | None, ratio: str | float | None, finish: str
 ) -> None:
     if phase is not None:
         real("phase", phase, -MOST_ANGLE, MOST_ANGLE)
     if isinstance(ratio, str):
         one_of("ratio", ratio, ("conformal", "search"))
-    else:
+    elif ratio is not None:
         real("ratio", ratio, above=1.0, high=MOST_RATIO)
     if torus is not None:
         instance("torus", torus, Torus, "Torus(R, r)")
         real("R / r of torus", torus.ratio, high=MOST_RATIO)
-        if ratio != "conformal":
+        if ratio is not None:
             raise OptionError("give the torus or the ratio of its radii, not both")
     one_of("finish", finish, ("ring", "face", "none"))
 

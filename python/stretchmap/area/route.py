@@ -37,7 +37,7 @@ class Route:
     """What `area_map` was asked for; `shape` weighs shapes against areas in the chart."""
 
     phase: float | None
-    ratio: Ratio | float
+    ratio: Ratio | float | None
     sem_iter: int
     finish: Finish
     steps: Steps
