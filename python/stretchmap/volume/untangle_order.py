@@ -295,9 +295,12 @@ def freed(run: Run) -> bool:
 
 
 def _hold_folded(run: Run) -> None:
-    """Let the boundary glide but for folded faces, which no step could unfold."""
+    """Let the boundary glide but for folded faces, which no step could unfold.
+
+    A start that is resumed may hold some already: faces of theirs alone are none that glide.
+    """
     faces = folded_faces(run.history.model, run.x)
-    held = np.unique(run.history.model.faces[faces]).astype(np.intp)
+    held = np.union1d(run.problem.held, run.history.model.faces[faces]).astype(np.intp)
     _log.info("%d boundary faces stay folded: their vertices are held", len(faces))
     run.take(dataclasses.replace(run.problem, held=held))
 

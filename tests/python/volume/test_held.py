@@ -24,7 +24,7 @@ from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import VolumeProblem
 from stretchmap.volume.run import Run
 from stretchmap.volume.start import started
-from stretchmap.volume.untangle import untangle_whole
+from stretchmap.volume.untangle import stuck_tets, untangle_whole
 
 SOLID = sm.samples.bumpy_torus(1500)
 
@@ -180,6 +180,17 @@ def test_a_source_that_meets_itself_is_not_started_again(monkeypatch):
     found = sm.volume_map(crossing, keep_best=True)
     assert len(tried) == 1 and not found.certificate.certified
     assert found.certificate.reason.startswith("the source surface touches or crosses itself")
+
+
+def test_what_a_resumed_start_holds_stays_held(problem):
+    held = problem.solid.boundary_vertices[:9].astype(np.intp)
+    given = dataclasses.replace(problem, held=held)
+    options = VolumeOptions()
+    history = History(given.model(options), Budget(60.0))
+    run = Run(given, options, history, history.budget)
+    untangle_order._hold_folded(run)
+    assert np.array_equal(run.problem.held, held)
+    assert not len(stuck_tets(run.history.model, run.x, glide=True))
 
 
 def solved_after_holding(problem, monkeypatch):
