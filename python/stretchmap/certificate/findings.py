@@ -99,8 +99,8 @@ class Findings:
         )
 
 
-def require_certified(certificate: Certificate, what: str) -> None:
-    """Refuse what is not proven to be a bijection.
+def require_certified(certificate: Certificate, what: str, hint: str = "") -> None:
+    """Refuse what is not proven to be a bijection, with a hint at what may be the reason.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def require_certified(certificate: Certificate, what: str) -> None:
     """
     if not certificate.certified:
         raise CertificationError(
-            f"{what} is not certified: {certificate.reason}; keep_best=True returns it all the "
-            "same",
+            f"{what} is not certified: {certificate.reason}; {hint and hint + '; '}keep_best=True "
+            "returns it all the same",
             next(iter(certificate.ids.values()), ()),
         )

@@ -15,8 +15,11 @@ from scipy.sparse.linalg import spsolve
 import stretchmap as sm
 from shapes import mug
 from stretchmap import _core, samples
+from stretchmap.base import budget
+from stretchmap.certificate.findings import require_certified
 from stretchmap.errors import (
     ArrayError,
+    CertificationError,
     DegenerateError,
     KindError,
     NonFiniteError,
@@ -468,3 +471,15 @@ def test_a_start_with_a_broken_image_is_refused_for_what_it_is(of_surface):
 def test_options_name_what_they_may_be(name, value):
     with pytest.raises(OptionError, match=f"{name} must be"):
         sm.VolumeOptions(**{name: value})
+
+
+def test_of_very_many_flipped_tets_a_knotted_hole_may_be_the_reason(monkeypatch):
+    monkeypatch.setattr(budget, "_LEAST_SECONDS", 0.05)
+    hasty = sm.VolumeOptions(time_limit=1e-9)
+    with pytest.raises(CertificationError, match="hole is knotted"):
+        sm.volume_map(mug(7, 1, 7), options=hasty)
+    proven = sm.certify(samples.solid_torus(400), samples.solid_torus(400).V)
+    crossed = dataclasses.replace(proven, certified=False, reason="2 faces cross")
+    with pytest.raises(CertificationError) as caught:
+        require_certified(crossed, "the map")
+    assert str(caught.value).startswith("the map is not certified: 2 faces cross; keep_best=True")
