@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from ..base.budget import Budget
 from ..base.progress import Progress
-from ..errors import SolverError
+from ..errors import OrientationError, SolverError
 from ..mesh.meshes import TetMesh
 from .engine import solve
 from .options import VolumeOptions
@@ -68,7 +68,7 @@ def certified_map(
     if start is None:
         starts = ranked_starts(solid, options, budget, glide=glide, progress=progress)
     best, least, best_took = None, (True, 0, math.inf, True), 0.0
-    vain, clock = 0.0, time.perf_counter()
+    vain, clock, failed = 0.0, time.perf_counter(), None
     left_off = None  # the best one, where it made room
     before, latest = budget.left, 0.0  # processor seconds the last start took, but for comparing it
 
@@ -92,17 +92,24 @@ def certified_map(
                 yield begin
 
     for begin in in_turn():
-        outcome = solve(
-            begin.problem,
-            options,
-            glide=glide,
-            budget=budget,
-            patience=begin.patience,
-            hasty=begin.hasty,
-            afar=left_off is None or not nearly(),
-            resumed=begin.resumed,
-            progress=progress,
-        )
+        try:
+            outcome = solve(
+                begin.problem,
+                options,
+                glide=glide,
+                budget=budget,
+                patience=begin.patience,
+                hasty=begin.hasty,
+                afar=left_off is None or not nearly(),
+                resumed=begin.resumed,
+                progress=progress,
+            )
+        except SolverError as error:
+            _log.info("a start has broken down: %s", error)
+            if best is not None:
+                break
+            failed = failed or error
+            continue
         seconds = {**outcome.seconds, "start": begin.seconds + outcome.seconds["start"]}
         outcome = dataclasses.replace(outcome, seconds=seconds)
         found = volume_result(outcome, "certified", "glide" if glide else "frozen", begin.map)
@@ -134,7 +141,9 @@ def certified_map(
         held = f"{len(outcome.problem.held)} vertices are held"
         why = held if found.certificate.certified else f"not certified ({best.certificate.reason})"
         _log.info("%s: once more from another start", why)
-    assert best is not None
+    if best is None:
+        assert failed is not None
+        raise failed
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
@@ -151,7 +160,7 @@ def _thinner(
     there = dataclasses.replace(options, ratio=_THINNER * found.torus.ratio)
     try:
         start = next(ranked_starts(solid, there, budget, glide=True, progress=progress), None)
-    except SolverError:
+    except (OrientationError, SolverError):  # so few faces may enclose nothing there
         return None
     return start and dataclasses.replace(start, hasty=False)
 

@@ -39,9 +39,9 @@ _log = logging.getLogger("stretchmap")
 # Mean abs(ratio - 1) from which on more vertices are worth their time, and how often; the tets they
 # are for have so many times the mean energy.
 _UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, 3.0
-# Of coarse solids more tets get vertices where those do not lead to such a mean, as long as there
-# are no more tets than that.
-_BADLY, _MORE, _COARSE = 0.06, (1.0, 0.3), 5000
+# More tets get vertices where those do not lead to such a mean, as long as there are no more tets
+# than go with it: a coarse solid gets them cheaply.
+_MORE, _BADLY = (1.0, 0.3), ((5_000, 0.06), (40_000, 0.08))
 _FINER = 0.7  # share of the time left that this may take
 _GAINED = 0.99  # of how uneven volumes were, at most: else the vertices are taken back
 
@@ -193,8 +193,7 @@ def _finer(run: Run, done: Minimized) -> Minimized:
             before, edges = run.problem, _uneven_edges(run.problem, poor)
             if not len(edges) or history.budget.spent:
                 break
-            fine = before.solid.n_tets + TETS_PER_EDGE * len(edges) > _COARSE
-            if poor != _POOR and (fine or _mean_error(before, run.x) <= _BADLY):
+            if poor != _POOR and not _is_bad(before, TETS_PER_EDGE * len(edges)):
                 break
             run.take(before.halved(edges))
             more = minimize(
@@ -218,7 +217,12 @@ def _finer(run: Run, done: Minimized) -> Minimized:
 def _ratios(
     problem: VolumeProblem, x: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Volume ratios of the tets, and their volumes."""
+    """Volume ratios of the tets, and their volumes.
+
+    To what the boundary of the start encloses; it comes to enclose less, up to a third where it is
+    coarse. Relative to that, elements that are too large would get as many vertices as those that
+    are squeezed, and volumes would be less even.
+    """
     volumes = _core.mesh.tet_volumes(problem.V, problem.solid.T)
     return _core.mesh.tet_volumes(x, problem.solid.T) / volumes, volumes
 
@@ -232,6 +236,13 @@ def _unevenness(problem: VolumeProblem, x: NDArray[np.float64]) -> float:
 def _mean_error(problem: VolumeProblem, x: NDArray[np.float64]) -> float:
     """The same over the tets, whatever their volumes."""
     return float(np.abs(_ratios(problem, x)[0] - 1.0).mean())
+
+
+def _is_bad(problem: VolumeProblem, more: int) -> bool:
+    """Whether volumes are kept so badly that so many more tets are worth their time."""
+    n_tets = problem.solid.n_tets + more
+    enough = next((mean for most, mean in _BADLY if n_tets <= most), np.inf)
+    return _mean_error(problem, problem.x) > enough
 
 
 def _is_uneven(problem: VolumeProblem, x: NDArray[np.float64]) -> bool:

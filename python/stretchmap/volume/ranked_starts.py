@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ import numpy as np
 from .. import _core
 from ..base.budget import Budget
 from ..base.progress import Progress
+from ..errors import OrientationError
 from ..maps.result import MapResult
 from ..mesh.meshes import TetMesh
 from .boundary_starts import boundary_starts
@@ -20,6 +22,8 @@ from .problem import VolumeProblem
 from .start import started
 
 __all__ = ["Start", "ranked_starts"]
+
+_log = logging.getLogger("stretchmap")
 
 # Share of tets the harmonic map turns over from which on it tells more about a start than the order
 # in which they are made: of a thin shell it is a fifth from one, and a thousandth from another.
@@ -70,15 +74,31 @@ def ranked_starts(
     """Those of `boundary_starts`; if the first turns many tets over, the best of a few comes first.
 
     A boundary that does not glide is kept in order: what counts there is how exact its areas are.
+
+    Raises
+    ------
+    OrientationError
+        No boundary encloses anything.
     """
 
     def begun() -> Iterator[Start]:
+        failed, any_begun = None, False
         for found in boundary_starts(solid, options, glide=glide, budget=budget, progress=progress):
             clock = time.perf_counter()
-            problem = VolumeProblem.of(solid, found.image, torus=found.torus, refine=options.refine)
+            try:
+                problem = VolumeProblem.of(
+                    solid, found.image, torus=found.torus, refine=options.refine
+                )
+            except OrientationError as error:  # few faces can enclose nothing on one torus alone
+                _log.info("one start less: %s", error)
+                failed = failed or error
+                continue
             problem = started(problem, solver=options.solver)
             patience = 1.0 if found.certificate.certified else 0.5
+            any_begun = True
             yield Start(found, problem, patience, time.perf_counter() - clock, hasty=True)
+        if failed is not None and not any_begun:
+            raise failed
 
     starts = _best_first(begun(), budget) if glide else begun()
     for start, share in zip(

@@ -38,7 +38,7 @@ def finer(solid):
 @pytest.fixture
 def not_coarse(monkeypatch):
     """Small solids are refined as large ones are, with time for all rounds on slow processors."""
-    monkeypatch.setattr(engine, "_COARSE", 0)
+    monkeypatch.setattr(engine, "_BADLY", ())
     monkeypatch.setattr(budget, "_LEAST_SECONDS", 10 * budget._LEAST_SECONDS)
 
 
@@ -104,9 +104,22 @@ def test_coarse_solids_get_as_many_vertices_as_it_takes(monkeypatch):
     maps = [sm.volume_map(each) for each in solids]
     assert all(each.certificate.certified and each.converged for each in maps)
     assert max(map(mean_error, maps)) < 0.075
-    assert max(each.mesh.n_tets for each in maps) <= engine._COARSE
+    assert max(each.mesh.n_tets for each in maps) <= engine._BADLY[0][0]
     monkeypatch.setattr(engine, "_MORE", ())
     assert min(mean_error(sm.volume_map(each)) for each in solids) > 0.08
+
+
+def test_solids_that_are_not_coarse_get_more_where_volumes_are_kept_worse(monkeypatch):
+    """A comb of two rows of cells; its teeth are what is squeezed."""
+    cells = np.zeros((11, 5, 2), bool)
+    cells[:, 0] = cells[:3, :3] = cells[4::2] = True
+    cells[1, 1] = False
+    solid = sm.TetMesh(*cut_cells(cells), orient=True)
+    more = sm.volume_map(solid)
+    assert more.certificate.certified and more.converged and mean_error(more) < 0.08
+    assert engine._BADLY[0][0] < more.mesh.n_tets <= engine._BADLY[1][0]
+    monkeypatch.setattr(engine, "_BADLY", engine._BADLY[:1])
+    assert mean_error(sm.volume_map(solid)) > 0.08
 
 
 def test_rounds_go_on_while_volumes_are_kept_badly(monkeypatch, not_coarse):

@@ -16,6 +16,7 @@ from stretchmap.area import balance, route
 from stretchmap.area.balance import balance_areas
 from stretchmap.base.budget import Budget
 from stretchmap.errors import CertificationError, SolverError
+from stretchmap.samples.solids import cut_cells
 from stretchmap.volume import boundary_starts as boundary_starts_module
 from stretchmap.volume import certified
 from stretchmap.volume import ranked_starts as module
@@ -356,3 +357,54 @@ def test_a_mug_whose_walls_have_few_vertices_inside(size):
     result = sm.volume_map(mug(*size), options=VolumeOptions(time_limit=0.01))
     assert result.certificate.certified and result.converged
     assert result.distortion.element_std < 0.105
+
+
+def test_a_torus_on_which_so_few_faces_enclose_nothing_is_passed_over():
+    """A ring of eight cells with a long arm: one of its starts, and that on a thinner torus."""
+    cells = np.zeros((12, 12, 1), bool)
+    cells[1:4, 1:4] = True
+    cells[3:, 1] = cells[11, 1:] = cells[5:, 11] = cells[5, 4:] = True
+    cells[2, 2] = False
+    result = sm.volume_map(sm.TetMesh(*cut_cells(cells), orient=True))
+    assert result.certificate.certified
+
+
+def breaking(monkeypatch, broken: set[int]) -> list[int]:
+    """Solves that break down by their number; those that were begun."""
+    solve, begun = certified.solve, []
+
+    def may_break(problem, options, **keywords):
+        begun.append(len(begun))
+        if begun[-1] in broken:
+            raise SolverError("the energy is infinite", ())
+        done = solve(problem, options, **keywords)
+        folded = len(broken) and begun[-1] < max(broken)
+        return dataclasses.replace(done, problem=folded_of(done.problem)) if folded else done
+
+    monkeypatch.setattr(certified, "solve", may_break)
+    return begun
+
+
+def folded_of(problem):
+    """One tet turned over."""
+    x = problem.x.copy()
+    inner = np.flatnonzero(problem.solid.boundary_index < 0)[0]
+    x[inner] += 10.0
+    return dataclasses.replace(problem, x=x)
+
+
+def test_a_start_that_breaks_down_is_one_less(monkeypatch):
+    begun = breaking(monkeypatch, {0})
+    assert sm.volume_map(SOLID).certificate.certified and begun == [0, 1]
+
+
+def test_what_there_is_is_kept_where_a_later_start_breaks_down(monkeypatch):
+    begun = breaking(monkeypatch, {1})
+    found = sm.volume_map(SOLID, keep_best=True)
+    assert begun == [0, 1] and not found.certificate.certified
+
+
+def test_if_all_starts_break_down_the_first_reason_is_told(monkeypatch):
+    breaking(monkeypatch, set(range(20)))
+    with pytest.raises(SolverError, match="energy is infinite"):
+        sm.volume_map(SOLID, keep_best=True)
