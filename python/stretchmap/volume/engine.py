@@ -200,7 +200,10 @@ def _finer(run: Run, done: Minimized) -> Minimized:
                 history.model, run.x, history, glide=True, start=o.volume_weight,
                 goal=o.volume_weight, leave=partial(_is_uneven, run.problem),
             )  # fmt: skip
-            if not _unevenness(run.problem, more.x) < _GAINED * _unevenness(before, before.x):
+            gained = _unevenness(run.problem, more.x) < _GAINED * _unevenness(before, before.x)
+            if poor != _POOR and not (more.left or more.converged):  # cut off, and yet to settle
+                gained &= _mean_error(run.problem, more.x) < _mean_error(before, before.x)
+            if not gained:
                 run.take(before)
                 break
             done = more
