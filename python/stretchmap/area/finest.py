@@ -34,6 +34,7 @@ _COARSELY = 3.0
 _AT_ONCE = 0.6  # share of all faces that there may be, that this may take
 # Share of the work left for the surface as it is, until no face of a finer one is folded.
 _RESERVED = 0.25
+_RIGHT = 2.0  # times the tolerance
 # Below it, areas tell of the ratio: tried first, so many times in all, and a step's most.
 _SENSITIVE, _FATTER, _RATIOS, _FARTHEST = 1.1, 0.9, 5, 0.3
 
@@ -65,7 +66,26 @@ class Finest:
     def found(self, *, refine: bool) -> AreaMap:
         """The map of a surface as fine as there is work for, certified or not.
 
-        One that is mapped by way of coarser ones has no chart of its own to begin with.
+        With the best ratio, too, if it is left open and areas stay off.
+        """
+        found = self._on_one_torus(refine=refine)
+        right = found.certificate.certified
+        right &= found.distortion.element_std <= _RIGHT * self.route.steps.tol
+        if right or self.route.ratio is not None or self.work.steps() < ROUND_STEPS:
+            return found
+        _log.info("areas stay off: once more with the best R / r")
+        searched = dataclasses.replace(self, route=dataclasses.replace(self.route, ratio="search"))
+        other = searched._on_one_torus(refine=refine)
+
+        def rank(each: AreaMap) -> tuple[bool, float]:
+            return not each.certificate.certified, each.distortion.element_std
+
+        return min(found, other, key=rank)
+
+    def _on_one_torus(self, *, refine: bool) -> AreaMap:
+        """The map with one ratio.
+
+        A surface that is mapped by way of coarser ones has no chart of its own to begin with.
         """
         level, finer, coarse = self.equal.level, None, False
         if refine and len(self.stack) == 1:

@@ -81,8 +81,9 @@ def area_map(
     ratio : "conformal", "search" or float, optional
         ``R / r``: that of the conformal map, the best found by a search, or given, above 1 and at
         most 1e6, beyond which coordinates are too coarse for the tube. Left out, it is that of the
-        conformal map, but the best if that is below 1.1, and where many edges have to be halved,
-        if fewer are with the best. Not together with ``torus``.
+        conformal map, but the best if that is below 1.1, where many edges have to be halved, if
+        fewer are with the best, and where areas stay off, if they do less. Not together with
+        ``torus``.
     finish : "ring", "face" or "none"
         ``"face"``: Newton steps on the face areas of the polyhedral image. ``"ring"``: then, where
         their SD is at most twice ``tol``, a projection that makes the area of every vertex ring

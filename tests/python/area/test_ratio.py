@@ -35,3 +35,15 @@ def test_fewer_edges_are_halved_with_the_best_ratio():
     assert conformal.ratio == pytest.approx(sm.conformal_map(surface).torus.ratio, rel=1e-12)
     assert surface.n_faces < free.mesh.n_faces < 0.95 * conformal.mesh.n_faces
     assert free.ratio < 0.95 * conformal.ratio and free.distortion.element_std < 0.01
+
+
+def test_where_areas_stay_off_the_best_ratio_is_tried_too():
+    """A ring drawn thin: by the conformal map, one of R / r = 30."""
+    u, v = np.meshgrid(*(np.arange(n) * 2 * np.pi / n for n in (60, 16)), indexing="ij")
+    r = 0.01 + 0.99 * np.sin(u / 2) ** 2
+    x = 3.0 + r * np.cos(v)
+    V = np.stack([x * np.cos(u), x * np.sin(u), r * np.sin(v)], axis=-1).reshape(-1, 3)
+    surface = sm.TriMesh(V, sm.samples.torus_surface(60, 16).F, orient=True)
+    conformal, free = sm.area_map(surface, ratio="conformal"), sm.area_map(surface)
+    assert free.ratio < 0.5 * conformal.ratio and free.certificate.certified
+    assert free.distortion.element_std < 0.6 * conformal.distortion.element_std
