@@ -14,7 +14,7 @@ import numpy as np
 import stretchmap as sm
 from stretchmap.plot import populations
 
-bones = sm.samples.vertebra_population(6, seed=2, n_tets=2000)
+bones = sm.samples.vertebra_population(6, seed=2, n_tets=1600)
 found = sm.population.fit(bones.solids, max_rounds=2, tol=5e-3)
 print(found.summary())
 modes = populations.modes(found, 3)

@@ -27,7 +27,7 @@ ROUNDS = {"max_rounds": 2, "tol": 0.01}
 
 @pytest.fixture(scope="module")
 def bones():
-    return sm.samples.vertebra_population(6, seed=2, n_tets=2000)
+    return sm.samples.vertebra_population(6, seed=2, n_tets=1600)
 
 
 @pytest.fixture(scope="module")

@@ -67,10 +67,10 @@ def vertebra_grid(vertebra_map):
 
 
 def test_an_optimized_grid_is_valid_of_good_shape_and_fills_the_solid(bumpy_map):
-    raw = hex_mesh(bumpy_map, n_hexahedra=1000, optimize=False)
+    raw = hex_mesh(bumpy_map, n_hexahedra=700, optimize=False)
     assert raw.moved == raw.boundary_moved == 0.0
-    mesh = hex_mesh(bumpy_map, n_hexahedra=1000)
-    assert 800 < len(mesh.H) < 1200
+    mesh = hex_mesh(bumpy_map, n_hexahedra=700)
+    assert 560 < len(mesh.H) < 840
     assert mesh.n_invalid == 0 and mesh.valid.all()
     assert mesh.jacobians.max() <= 1.0 + 1e-12
     assert mesh.scaled_jacobians.min() > 0.35
@@ -95,7 +95,7 @@ def test_a_tangled_grid_is_made_valid(vertebra_map, vertebra_grid):
     assert abs(mesh.volume / vertebra_map.mesh.volume - 1.0) < 0.05
 
 
-@pytest.mark.parametrize(("seed", "length"), [(0, 100.0), (5, 100.0), (6, 30.0)])
+@pytest.mark.parametrize(("seed", "length"), [(5, 100.0), (6, 30.0)])
 def test_grids_of_very_long_solids_are_valid_and_do_not_swell(vertebra_map, seed, length):
     """Edges next to parallel do not untangle as they are; or shapes win over the fit."""
     turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
