@@ -205,15 +205,15 @@ def _halve(run: Run, edges: NDArray[np.int32], stuck: NDArray[np.intp]) -> None:
 
 
 def _untangled_halved(run: Run, stuck: NDArray[np.intp], *, glide: bool) -> NDArray[np.intp]:
-    """Few stuck tets untangled with edges round them halved, or left as they are.
+    """Few stuck tets untangled with edges round them halved, or fewer left, or as they are.
 
     First those by which they hang on the boundary. Where that breeds more than it cures, all in
     their surroundings: a vertex that sees less of the boundary still has to see all of its star,
     and that gets room only where the stars next to it do.
     """
-    before, left, edges = run.problem, stuck, crowded_edges
+    best, fewest, left, edges = run.problem, stuck, stuck, crowded_edges
     for _ in range(_HASTY_ROUNDS if run.hasty else _ROUNDS):
-        if before.refinement is None or not 0 < len(left) <= _FEW_STUCK:
+        if best.refinement is None or not 0 < len(left) <= _FEW_STUCK:
             break
         if run.history.budget.spent:
             break
@@ -232,10 +232,11 @@ def _untangled_halved(run: Run, stuck: NDArray[np.intp], *, glide: bool) -> NDAr
         if glide and len(now):
             now = _patched_gliding(run, now, rings=_NARROW, share=_WORTH)
         left = now
-    if not len(left):
-        return left
-    run.take(before)
-    return stuck
+        if len(left) < len(fewest):
+            best, fewest = run.problem, left
+    if run.problem is not best:
+        run.take(best)
+    return fewest
 
 
 def _patched(

@@ -372,3 +372,21 @@ def test_patches_reach_further_where_they_hardly_help(monkeypatch, left, rings):
     # Where another start follows, none are as large as all.
     assert patched(hasty=True) and reached == ([1, 2] if left == 200 else [1, 1, 1, 1, 2])
     assert patched(rings=(8,)) and reached == [8] * (1 if left == 200 else 4)
+
+
+@pytest.mark.parametrize(("counts", "kept"), [([3, 4, 4], 1), ([3, 2, 5], 2), ([6, 6, 7], 0)])
+def test_halving_that_cures_some_keeps_what_it_cured(monkeypatch, counts, kept):
+    """The fewest tets left, with the edges halved up to there."""
+    run, left = run_of(sm.samples.bumpy_torus(600)), iter(counts)
+    run.hasty = True
+    problems = [run.problem]
+
+    def halve(run, edges, stuck):
+        run.x = run.x.copy()
+        problems.append(run.problem)
+
+    monkeypatch.setattr(order, "_halve", halve)
+    monkeypatch.setattr(order, "_patched", lambda *_, **__: np.arange(next(left)))
+    monkeypatch.setattr(order, "crowded_edges", order.surrounding_edges)
+    found = order._untangled_halved(run, np.arange(5), glide=False)
+    assert len(found) == min(5, *counts) and run.problem is problems[kept]
