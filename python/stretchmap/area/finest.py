@@ -35,6 +35,7 @@ _AT_ONCE = 0.6  # share of all faces that there may be, that this may take
 # Share of the work left for the surface as it is, until no face of a finer one is folded.
 _RESERVED = 0.25
 _RIGHT = 2.0  # times the tolerance
+_HARDLY_MORE = 1.3  # times the faces there are
 # Below it, areas tell of the ratio: tried first, so many times in all, and a step's most.
 _SENSITIVE, _FATTER, _RATIOS, _FARTHEST = 1.1, 0.9, 5, 0.3
 
@@ -161,10 +162,9 @@ class Finest:
             turns, more = self.equal.eased(shape, turns)
             records = records + more
             work.spend_in_chart(len(more))
-            fitted = [self._fitted(turns, wanted) for wanted in self._ratios]
-            there = [each for each in fitted if each is not None]
-            if there:
-                finer, phase = min(there, key=lambda each: each[0].level.surface.n_faces)
+            fitted = self._fitted_best(turns)
+            if fitted is not None:
+                finer, phase = fitted
                 seconds = {"sem": time.perf_counter() - clock}
                 made = Made(finer.angles, phase, finer.ratio, records, seconds=seconds)
                 found = self._finer(finer, made)
@@ -172,11 +172,20 @@ class Finest:
                     return True, found
         return True, None
 
-    @property
-    def _ratios(self) -> tuple[Ratio | float, ...]:
-        """Those of which the one is taken that needs fewer faces."""
+    def _fitted_best(self, turns: NDArray[np.float64]) -> tuple[Finer, float] | None:
+        """With the ratio asked for; if it is left open, that which needs fewer faces."""
         given = self.route.ratio
-        return ("conformal", "search") if given is None else (given,)
+        fitted = self._fitted(turns, given or "conformal")
+        if given is not None:
+            return fitted
+        if fitted is not None:
+            n_faces = fitted[0].level.surface.n_faces
+            if n_faces <= _HARDLY_MORE * self.equal.level.surface.n_faces:
+                return fitted  # a search takes as long as it can save
+        other = self._fitted(turns, "search")
+        if fitted is None or other is None:
+            return fitted or other
+        return min(fitted, other, key=lambda each: each[0].level.surface.n_faces)
 
     def _fitted(
         self, turns: NDArray[np.float64], ratio: Ratio | float
