@@ -69,10 +69,11 @@ class Finest:
 
         With the best ratio, too, if it is left open and areas stay off.
         """
-        found = self._on_one_torus(refine=refine)
+        found, steps = self._on_one_torus(refine=refine), self.route.steps
         right = found.certificate.certified
-        right &= found.distortion.element_std <= _RIGHT * self.route.steps.tol
-        if right or self.route.ratio is not None or self.work.steps() < ROUND_STEPS:
+        right &= found.distortion.element_std <= _RIGHT * steps.tol
+        alone = steps.balance == 1.0 and steps.max_iter >= ROUND_STEPS  # all that counts
+        if right or not alone or self.route.ratio is not None or self.work.steps() < ROUND_STEPS:
             return found
         _log.info("areas stay off: once more with the best R / r")
         searched = dataclasses.replace(self, route=dataclasses.replace(self.route, ratio="search"))

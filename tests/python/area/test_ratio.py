@@ -47,3 +47,6 @@ def test_where_areas_stay_off_the_best_ratio_is_tried_too():
     conformal, free = sm.area_map(surface, ratio="conformal"), sm.area_map(surface)
     assert free.ratio < 0.5 * conformal.ratio and free.certificate.certified
     assert free.distortion.element_std < 0.6 * conformal.distortion.element_std
+    # Not where shapes count as well, nor where but a few steps are asked for.
+    for asked in ({"balance": 0.5}, {"max_iter": 3}):
+        assert sm.area_map(surface, keep_best=True, **asked).ratio == conformal.ratio
