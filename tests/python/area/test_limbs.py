@@ -144,7 +144,7 @@ def test_a_stretch_solve_that_breaks_down_ends_there(monkeypatch):
     assert result.certificate.certified
 
 
-@pytest.mark.parametrize(("n_tets", "rings"), [(1000, 24), (4000, 20)])
+@pytest.mark.parametrize(("n_tets", "rings"), [(1000, 24)])
 def test_areas_give_way_where_they_would_fold_faces(monkeypatch, n_tets, rings):
     """Three edges round a branch: between two of them, spread over the torus, all is cut off."""
     surface = with_branch(sm.samples.bumpy_torus(n_tets), rings, 0.5).surface

@@ -108,7 +108,7 @@ def test_grids_of_very_long_solids_are_valid_and_do_not_swell(vertebra_map, seed
     assert abs(mesh.volume / long.volume - 1.0) < 0.02
 
 
-@pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (24, 2, 3), (20, 3, 2)])
+@pytest.mark.parametrize(("sections", "block", "rings"), [(16, 1, 1), (20, 3, 2)])
 def test_grids_of_other_sizes_are_valid_too(vertebra_map, sections, block, rings):
     mesh = hex_mesh(vertebra_map, sections=sections, block=block, rings=rings)
     assert mesh.n_invalid == 0 and len(mesh.H) == sections * block * (block + 4 * rings)
