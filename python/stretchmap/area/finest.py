@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..base.progress import Progress
 from ..base.torus import TWO_PI, Torus
+from ..conformal.torus import conformal_torus
 from ..errors import SolverError
 from .coarse import Level
 from .finer import ROUND_STEPS, STEPS_LEFT, Finer, goal, mapped_finer
@@ -36,7 +37,8 @@ _AT_ONCE = 0.6  # share of all faces that there may be, that this may take
 _RESERVED = 0.25
 _RIGHT = 2.0  # times the tolerance
 _HARDLY_MORE = 1.3  # times the faces there are
-# Below it, areas tell of the ratio: tried first, so many times in all, and a step's most.
+# Below it the hole of the torus all but closes: a small error of the ratio costs areas, which tell
+# of it. What is tried first, so many times in all, and a step's most.
 _SENSITIVE, _FATTER, _RATIOS, _FARTHEST = 1.1, 0.9, 5, 0.3
 
 
@@ -67,8 +69,11 @@ class Finest:
     def found(self, *, refine: bool) -> AreaMap:
         """The map of a surface as fine as there is work for, certified or not.
 
-        With the best ratio, too, if it is left open and areas stay off.
+        If the ratio is left open: with the best for a fat torus, and, too, where areas stay off.
         """
+        aspect = self.equal.level.aspect
+        if self.route.ratio is None and conformal_torus(aspect).ratio < _SENSITIVE:
+            return self._searched()._on_one_torus(refine=refine)
         found, steps = self._on_one_torus(refine=refine), self.route.steps
         right = found.certificate.certified
         right &= found.distortion.element_std <= _RIGHT * steps.tol
@@ -76,13 +81,16 @@ class Finest:
         if right or not alone or self.route.ratio is not None or self.work.steps() < ROUND_STEPS:
             return found
         _log.info("areas stay off: once more with the best R / r")
-        searched = dataclasses.replace(self, route=dataclasses.replace(self.route, ratio="search"))
-        other = searched._on_one_torus(refine=refine)
+        other = self._searched()._on_one_torus(refine=refine)
 
         def rank(each: AreaMap) -> tuple[bool, float]:
             return not each.certificate.certified, each.distortion.element_std
 
         return min(found, other, key=rank)
+
+    def _searched(self) -> Finest:
+        """The same with the best ratio."""
+        return dataclasses.replace(self, route=dataclasses.replace(self.route, ratio="search"))
 
     def _on_one_torus(self, *, refine: bool) -> AreaMap:
         """The map with one ratio.

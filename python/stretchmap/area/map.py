@@ -14,7 +14,6 @@ from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..base.torus import MOST_ANGLE, MOST_RATIO, TWO_PI, Torus
 from ..conformal.map import ConformalMap, conformal_map
-from ..conformal.torus import conformal_torus
 from ..errors import CertificationError, OptionError
 from ..homology.basis import HomologyBasis
 from ..mesh.given import as_surface, require_same_mesh
@@ -33,10 +32,6 @@ if TYPE_CHECKING:
 __all__ = ["Finish", "area_map", "charted", "equal_areas", "finished", "turned"]
 
 _log = logging.getLogger("stretchmap")
-
-# Ratio of the conformal map below which the best one is searched for: where the hole of the torus
-# all but closes, a small error of the ratio costs areas.
-_FAT = 1.1
 
 
 @takes_threads
@@ -214,8 +209,6 @@ def _found(
     equal = equal_areas(surface, conformal, progress, budget)
     if route.finish == "none":
         return charted(route, equal, conformal, progress, torus)
-    if route.ratio is None and conformal_torus(equal.level.aspect).ratio < _FAT:
-        route = dataclasses.replace(route, ratio="search")
     stack = levels(equal.level)
     work = Work.of(surface, budget, refine=refine)
     found = Finest(route, stack, equal, torus, work, progress).found(refine=refine)

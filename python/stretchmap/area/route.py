@@ -34,7 +34,10 @@ _Turns = tuple[NDArray[np.float64], list[IterationRecord]]
 
 @dataclass(frozen=True)
 class Route:
-    """What `area_map` was asked for; `shape` weighs shapes against areas in the chart."""
+    """What `area_map` was asked for; `shape` weighs shapes against areas in the chart.
+
+    A ratio of None is that of the conformal map where nothing speaks against it.
+    """
 
     phase: float | None
     ratio: Ratio | float | None
@@ -190,7 +193,7 @@ def best_turns(
     route: Route, equal: EqualAreas
 ) -> tuple[NDArray[np.float64], tuple[float, float, float], list[IterationRecord]]:
     """Turns with nearly equal areas; phase, ratio and energy of their image; records."""
-    level, phase, ratio = equal.level, route.phase, route.ratio
+    level, phase, ratio = equal.level, route.phase, route.ratio or "conformal"
     turns, history = equal.stretched(route.sem_iter)
     found = search_phase(level.surface, turns, level.aspect, phase, ratio)
     if route.shape or (route.sem_iter and history[-1].energy > 1.0 + JAMMED):

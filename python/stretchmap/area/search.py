@@ -29,12 +29,9 @@ def search_phase(
     turns: NDArray[np.float64],
     aspect: float,
     phase: float | None,
-    ratio: Ratio | float | None,
+    ratio: Ratio | float,
 ) -> tuple[float, float, float]:
-    """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image, and it.
-
-    The ratio of the conformal map, if it is None.
-    """
+    """Phase and ratio with the least symmetric Dirichlet energy of the polyhedral image, and it."""
     sample = surface.F[:: -(-len(surface.F) // _SAMPLE)]
     used, inverse = np.unique(sample, return_inverse=True)
     faces = inverse.reshape(sample.shape).astype(np.int32)
@@ -45,7 +42,7 @@ def search_phase(
     if ratio == "search":
         ratios = np.array([conformal, *_RATIOS])
     else:
-        ratios = np.array([conformal if ratio in (None, "conformal") else float(ratio)])
+        ratios = np.array([conformal if ratio == "conformal" else float(ratio)])
     width = np.array([0.0 if phase is not None else 1.0 / _PHASES, 0.2 * (len(ratios) > 1)])
     # Near a ratio of one the best phase is a narrow one: a ratio is judged by its own best.
     rows = np.array([(p, r) for r in ratios for p in phases])
