@@ -213,6 +213,31 @@ def test_a_round_cut_off_by_time_is_kept_where_volumes_gain(solid, monkeypatch):
     assert result.converged and result.certificate.certified  # by the steps after it
 
 
+@pytest.mark.parametrize("falls", [False, True])
+def test_a_further_round_cut_off_by_time_counts_where_the_mean_of_all_falls(monkeypatch, falls):
+    minimize, rounds = engine.minimize, []
+
+    def cut_off(model, x, history, *, leave=None, **keywords):
+        done = minimize(model, x, history, leave=leave, **keywords)
+        if keywords["glide"] and keywords["start"] == keywords["goal"] and leave is not None:
+            rounds.append(done)
+            history.budget = history.budget.share(0.0)
+            done = dataclasses.replace(done, converged=False, left=False)
+        return done
+
+    monkeypatch.setattr(engine, "minimize", cut_off)
+    monkeypatch.setattr(engine, "_POOR", np.inf)  # further rounds alone
+    monkeypatch.setattr(engine, "_unevenness", lambda problem, x: 1.0 / problem.solid.n_tets)
+    monkeypatch.setattr(
+        engine, "_mean_error", lambda problem, x: problem.solid.n_tets ** (-1.0 if falls else 1.0)
+    )
+    monkeypatch.setattr(engine, "_BADLY", ((5_000, 0.0),))
+    monkeypatch.setattr(engine, "_UNEVEN", 0.0)
+    result = sm.volume_map(drilled(0.05), options=sm.VolumeOptions(ratio=2.0))  # on one torus
+    assert len(rounds) == 1 and result.certificate.certified
+    assert (len(result.refinement.halved) > 0) == falls
+
+
 def test_vertices_are_for_large_tets_that_keep_their_volume_worst(monkeypatch):
     solid = sm.samples.bumpy_torus(3000)
     torus = sm.area_map(solid.surface).torus

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from stretchmap.errors import OrientationError
 from stretchmap.volume import certified
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import Outcome
@@ -218,3 +219,23 @@ def test_where_volumes_are_kept_badly_thinner_tori_are_tried(
     budget.left = 1.0
     certified.certified_map(solid, VolumeOptions(ratio=2.0), None, glide=True, progress=None)
     assert ratios == [2.0]
+
+
+def test_a_map_is_kept_where_so_few_faces_enclose_nothing_on_a_thinner_torus(monkeypatch) -> None:
+    def starts(_: Any, options: VolumeOptions, *__: Any, **___: Any) -> Any:
+        if options.ratio:
+            raise OrientationError("the boundary image encloses no volume")
+        yield Start(SimpleNamespace(), SimpleNamespace(held=()))
+
+    record = SimpleNamespace(stage="glide", energy=0.1)
+    found = Found(0, {}, 0.3, SimpleNamespace(ratio=2.0))
+    monkeypatch.setattr(certified, "ranked_starts", starts)
+    monkeypatch.setattr(
+        certified,
+        "solve",
+        lambda problem, *_, **__: Outcome(problem, (record,), True, "", {"start": 0.0}),
+    )
+    monkeypatch.setattr(certified, "volume_result", lambda *_: found)
+    solid = SimpleNamespace(n_tets=1000)
+    kept = certified.certified_map(solid, VolumeOptions(), None, glide=True, progress=None)
+    assert kept.mean == found.mean
