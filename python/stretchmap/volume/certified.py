@@ -106,9 +106,12 @@ def certified_map(
             )
         except SolverError as error:
             _log.info("a start has broken down: %s", error)
-            if best is not None:
+            failed, before = failed or error, budget.left
+            clock, took = time.perf_counter(), time.perf_counter() - clock
+            vain += took
+            # One on a thinner torus would be the same again.
+            if best is not None and (_done(least) or _is_late(budget)):
                 break
-            failed = failed or error
             continue
         seconds = {**outcome.seconds, "start": begin.seconds + outcome.seconds["start"]}
         outcome = dataclasses.replace(outcome, seconds=seconds)
@@ -134,7 +137,7 @@ def certified_map(
                 break
             _log.info("volumes are kept badly: once more on a thinner torus")
             continue
-        if budget.left < _WORTH_A_START * budget.seconds:
+        if _is_late(budget):
             break
         if not best.certificate.checks.get("source_embedded", True):
             break  # no start mends the source
@@ -147,6 +150,11 @@ def certified_map(
     if not vain:
         return best
     return dataclasses.replace(best, seconds={**best.seconds, "other starts": vain})
+
+
+def _is_late(budget: Budget) -> bool:
+    """Whether too little time is left for another start."""
+    return budget.left < _WORTH_A_START * budget.seconds
 
 
 def _thinner(

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from stretchmap.errors import OrientationError
+from stretchmap.errors import OrientationError, SolverError
 from stretchmap.volume import certified
 from stretchmap.volume.options import VolumeOptions
 from stretchmap.volume.problem import Outcome
@@ -44,8 +44,9 @@ def order(
 ) -> list[str]:
     """Names of the starts as they are solved, in capitals where none is to make room.
 
-    ``stuck`` says how many tets each leaves inverted in haste, ``kept`` how many if gone on with,
-    ``left`` what share of the time is left after each. ``note`` is told what else they are given.
+    ``stuck`` says how many tets each leaves inverted in haste, -1 if it breaks down, ``kept`` how
+    many if gone on with, ``left`` what share of the time is left after each. ``note`` is told what
+    else they are given.
     """
     solved: list[str] = []
     budget = SimpleNamespace(seconds=1.0, left=1.0)
@@ -60,6 +61,8 @@ def order(
         solved.append(problem.name if hasty else problem.name.upper())
         budget.left = left[len(solved) - 1]
         flips = stuck[problem.name] if hasty else kept
+        if flips < 0:
+            raise SolverError("the energy is infinite")
         return Outcome(problem, (), True, str(flips), {"start": 0.0})
 
     monkeypatch.setattr(certified.Budget, "of", lambda *_: budget)
@@ -90,6 +93,12 @@ def order(
         ({"a": 31, "b": 39}, [0.45, 0.09], 0, "ab"),
         # No time for any other.
         ({"a": 4, "b": 9}, [0.05], 0, "a"),
+        # One that breaks down is one less, whether or not others led anywhere before.
+        ({"a": 40, "b": -1, "c": 9}, [0.9, 0.8, 0.7, 0.6], 0, "abcC"),
+        ({"a": -1, "b": 40, "c": -1}, [0.9, 0.8, 0.7, 0.6], 0, "abcB"),
+        ({"a": 4, "b": 9, "c": 6}, [0.19, 0.18, 0.17, 0.15], -1, "aAbc"),
+        # So late that no other follows.
+        ({"a": 40, "b": -1, "c": 9}, [0.9, 0.05], 0, "ab"),
     ],
 )
 def test_a_start_that_made_room_is_gone_on_with(monkeypatch, stuck, left, kept, expected) -> None:
