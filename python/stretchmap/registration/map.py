@@ -260,13 +260,12 @@ def _image(filled: Filled) -> NDArray[np.float64]:
 
 def _stop_reason(filled: Filled, certificate: Certificate) -> str:
     """Why the optimization ended; where the boundary crossed itself to begin with, that."""
-    reason, crossings = filled.outcome.stop_reason, len(filled.boundary.crossings)
+    outcome, crossings = filled.outcome, len(filled.boundary.crossings)
     if certificate.certified or not crossings:
-        return reason
-    left = reason.removeprefix("the time limit was reached; ")
+        return outcome.stop_reason
     return (
         f"{crossings} pairs of faces of the boundary image cross, which more time does not mend, "
-        f"but landmarks may: {left}"
+        f"but landmarks may: {outcome.stuck or outcome.stop_reason}"
     )
 
 

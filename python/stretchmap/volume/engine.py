@@ -94,7 +94,8 @@ def solve(
     _core.base.give_free_memory_back()
     if left:
         reason = "the time limit was reached; " if run.history.budget.spent else ""
-        return _outcome(run, False, f"{reason}{left} tets could not be untangled")
+        stuck = f"{left} tets could not be untangled"
+        return dataclasses.replace(_outcome(run, False, reason + stuck), stuck=stuck)
     if not len(run.problem.held):  # else the boundary may stay folded, and another start be better
         history.budget = budget
     if on_mesh:

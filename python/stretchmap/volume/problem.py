@@ -204,6 +204,9 @@ class Outcome:
     vertex_exact : bool
     glided : bool
         Whether the boundary did on a mesh.
+    stuck : str
+        How many tets could not be untangled, in words that the stop reason ends with; empty if all
+        were.
     """
 
     problem: VolumeProblem
@@ -213,6 +216,7 @@ class Outcome:
     seconds: dict[str, float]
     vertex_exact: bool = False
     glided: bool = False
+    stuck: str = ""
 
 
 def _refuse_overconstrained(solid: TetMesh) -> None:

@@ -70,6 +70,9 @@ def test_a_solid_that_must_not_be_refined_is_given_up(bolt):
     assert outcome.problem.solid is whole and not outcome.converged
     assert (_core.mesh.tet_volumes(outcome.problem.x, whole.T) <= 0.0).any()
     assert "could not be untangled" in outcome.stop_reason
+    late = solve(VolumeProblem.of(whole, image, refine=False), FillOptions(), budget=Budget(0.0))
+    assert late.stop_reason == f"the time limit was reached; {late.stuck}"
+    assert late.stuck.endswith(" tets could not be untangled")
 
 
 def test_halved_edges_leave_the_way_back(bolt, refinement):
