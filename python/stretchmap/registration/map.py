@@ -109,7 +109,7 @@ def register(
     CertificationError
         The map is not a bijection, ``ids`` are the elements.
     OptionError
-        An option out of range.
+        An option out of range or combined with one it excludes.
     SolverError
         A numerical step broke down, or a flat torus shrinks faces far out on a limb to nothing;
         ``ids`` are faces of that boundary.

@@ -146,7 +146,7 @@ def fill(
     CertificationError
         Tets stay inverted, ``ids`` are those.
     OptionError
-        An option out of range.
+        An option out of range, or one of a boundary that glides.
 
     Notes
     -----

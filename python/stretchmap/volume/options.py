@@ -74,14 +74,15 @@ class FillOptions:
     frozen_tol : float
         At the largest lambda: stop when a step lowers the energy by no more than this share.
     frozen_weight, face_weight, glide_iter, glide_tol
-        Where the boundary glides: lambda at which that starts (on a mesh at 0.2 at most), weight
-        of the boundary triangles' barrier, most steps and the share at which to stop (on a mesh at
-        5e-4 at most; on a torus also eight steps in a row, none short, that gain sixteen times
-        that). Before, the boundary is held, and lambda grows up to there until a step is whole.
+        Only where the boundary glides: lambda at which that starts (on a mesh at 0.2 at most),
+        weight of the boundary triangles' barrier, most steps and the share at which to stop (on a
+        mesh at 5e-4 at most; on a torus also eight steps in a row, none short, that gain sixteen
+        times that). Before, the boundary is held, and lambda grows up to there until a step is
+        whole.
     glide_std, glide_distortion : float
-        SD of the ratios (6.5) round vertices, and total distortion (6.4), that are enough of a
-        boundary that glides on a mesh: when both are met it stops, for the farther vertices glide
-        the less they correspond. 0 goes on until the energy is at rest.
+        Only for `register`: SD of the ratios (6.5) round vertices, and total distortion (6.4), that
+        are enough of a boundary that glides on a mesh: when both are met it stops, for the farther
+        vertices glide the less they correspond. 0 goes on until the energy is at rest.
     shared : int
         Most steps in a row that share one Hessian; 1 renews it at every step.
     cg_tol : float
@@ -167,7 +168,7 @@ class VolumeOptions(FillOptions):
         In the end make the ring volume (6.5) of every interior vertex exact, unless that turns a
         tet over or costs too much; the result says whether it was done.
     exact_std_factor : float
-        That may raise the SD of the tet ratios by this factor.
+        Only with ``vertex_exact``, which may raise the SD of the tet ratios by this factor.
 
     Examples
     --------
@@ -232,6 +233,12 @@ def check_call(
         _only(options, _OF_PAPER, "Algorithm 5.1 does not take {}; leave c and method out")
     if method == "certified" and c is not None:
         raise OptionError("c belongs to Algorithm 5.1; use method='vsem' or leave it out")
+    if method == "certified" and boundary == "frozen":
+        _require_no_gliding(options)
+    elif method == "certified":
+        _only(options, _FIELDS - _ON_MESH, "only register takes {}: this boundary is on a torus")
+    if not options.vertex_exact:
+        _only(options, _FIELDS - _OF_RINGS, "{} goes with vertex_exact=True; give both, or neither")
     if started:
         _only(options, _FIELDS - _OF_TORUS, "the torus is that of start; leave {} out")
     if c is not None:
@@ -249,6 +256,12 @@ def check_prescribed(options: FillOptions, *, glide: bool) -> None:
     """Whether options are of use where the boundary is prescribed, or glides from there."""
     kept = _OF_FILL if glide else _OF_FILL | {"free_ratios"}
     _only(options, kept, "only volume_map takes {}: the boundary lies on no torus here")
+    if not glide:
+        _require_no_gliding(options)
+
+
+def _require_no_gliding(options: FillOptions) -> None:
+    _only(options, _FIELDS - _OF_GLIDING, "the boundary does not glide; leave {} out")
 
 
 def _only(options: FillOptions, names: Set[str], why: str) -> None:
@@ -265,6 +278,9 @@ def _only(options: FillOptions, names: Set[str], why: str) -> None:
 _FIELDS = {field.name for field in dataclasses.fields(VolumeOptions)}
 _OF_FILL = {field.name for field in dataclasses.fields(FillOptions)}
 _OF_TORUS = {"ratio", "phase"}
+_OF_RINGS = {"exact_std_factor"}
+_ON_MESH = {"glide_std", "glide_distortion"}
+_OF_GLIDING = {*_ON_MESH, "frozen_weight", "face_weight", "glide_iter", "glide_tol"}
 _OF_LEVELS = {"target_iter", "shift_iter", "marginal_tol"}
 _OF_OWN = {*_OF_TORUS, "refine", "solver"}
 _OF_PAPER = {*_OF_OWN, "tol"}  # which never refines
