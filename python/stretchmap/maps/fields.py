@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import read_only
+from ..base.options import shown
 from ..errors import ArrayError
 from ..io.arrays import checked
 from ..mesh.halved_faces import SurfaceRefinement
@@ -53,7 +54,8 @@ def carried(
     Raises
     ------
     ArrayError
-        Another number of rows than that of either mesh, or no numbers.
+        Another number of rows than that of either mesh, no numbers, or two names that are one once
+        slashes are underscores.
     """
     elements = mesh.T if isinstance(mesh, TetMesh) else mesh.F
     n, m = len(mesh.V), len(elements)
@@ -84,14 +86,23 @@ def _copies(fields: Fields) -> Fields:
 
 def _own(fields: Fields) -> Fields:
     """Without those whose names maps use themselves, and with names every archive takes."""
-    fields = {name.removeprefix("point:").removeprefix("cell:"): a for name, a in fields.items()}
-    left_out = sorted(fields.keys() & OF_MAPS)
+    own: Fields = {}
+    given: dict[str, str] = {}
+    for name, array in fields.items():
+        word = name.removeprefix("point:").removeprefix("cell:").replace("/", "_")
+        if word in given:
+            raise ArrayError(
+                f"the fields {shown(given[word])} and {shown(name)} would both be {word} in files "
+                "of a map; rename one"
+            )
+        own[word], given[word] = array, name
+    left_out = sorted(own.keys() & OF_MAPS)
     if left_out:
         _log.warning(
             "fields named like what a map holds itself are left out: %s; give them other names",
             ", ".join(left_out),
         )
-    return {k.replace("/", "_"): a for k, a in fields.items() if k not in OF_MAPS}
+    return {name: array for name, array in own.items() if name not in OF_MAPS}
 
 
 def _rows(data: Mapping[str, ArrayLike] | None, own: int, given: int) -> int:

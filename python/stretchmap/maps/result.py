@@ -147,7 +147,8 @@ class MapResult(CarriesPoints, HasSummary, Exchanged):
         Raises
         ------
         ArrayError
-            Another number of rows, or no numbers.
+            Another number of rows, no numbers, or two names that are one once slashes are
+            underscores.
         """
         added = getattr(self, "refinement", None)
         points, cells = carried(self.mesh, added, point_data, cell_data)

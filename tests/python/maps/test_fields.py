@@ -45,6 +45,17 @@ def test_fields_named_like_those_of_a_map_are_left_out_aloud(coarse, caplog):
     assert "left out: u; give them other names" in caplog.text
 
 
+def test_names_with_slashes_are_those_with_underscores(coarse, caplog):
+    x = coarse.mesh.V[:, 0]
+    carried = coarse.with_fields({"a/b": x}, {"a_b": x[coarse.mesh.T[:, 0]]})
+    assert set(carried.point_fields) == set(carried.cell_fields) == {"a_b"}
+    for names in (("a/b", "a_b"), ("a_b", "a/b"), ("point:a", "a")):
+        with pytest.raises(ArrayError, match=f"{names[0]!r} and {names[1]!r} would both be a"):
+            coarse.with_fields(dict.fromkeys(names, x))
+    assert not coarse.with_fields({"grad/u": x}).point_fields
+    assert "left out: grad_u; give them other names" in caplog.text
+
+
 def test_fields_are_added_to_those_there_as_copies(coarse):
     x, y = coarse.mesh.V[:, 0].copy(), np.arange(coarse.mesh.n_tets)
     carried = coarse.with_fields({"x": x, "load": x}).with_fields({"load": 2.0 * x}, {"y": y})
