@@ -120,15 +120,23 @@ def surface_of(mesh: TriMesh | TetMesh) -> TriMesh:
     return mesh.surface
 
 
-def surface_with_fields(mesh: TriMesh | TetMesh, fields: Fields) -> tuple[TriMesh, Fields]:
-    """`surface_of` with the data of its points; of a solid's tets its boundary has none."""
+def surface_with_fields(
+    mesh: TriMesh | TetMesh, fields: Fields, path: Path
+) -> tuple[TriMesh, Fields]:
+    """`surface_of` with the data of its points; of a solid's tets its boundary has none, which a
+    warning says."""
+    from ..base.options import shown
     from ..mesh.meshes import TetMesh
 
     surface = surface_of(mesh)
     if not isinstance(mesh, TetMesh):
         return surface, fields
+    points, cells = fields
+    if cells:
+        names = ", ".join(map(shown, cells))
+        _log.warning("%s: the boundary is mapped, which has no tets; left out: %s", path, names)
     ids = mesh.boundary_vertices
-    return surface, ({name: array[ids] for name, array in fields[0].items()}, {})
+    return surface, ({name: array[ids] for name, array in points.items()}, {})
 
 
 def check_fields(output: Path, mesh: TriMesh | TetMesh, fields: Fields) -> Fields:

@@ -49,7 +49,7 @@ def conformal(
     common.check_outputs(output, common.map_suffixes(), json)
     watch = common.Stopwatch()
     mesh, fields = common.read_with_fields(input, orient, compact)
-    surface, fields = common.surface_with_fields(mesh, fields)
+    surface, fields = common.surface_with_fields(mesh, fields, input)
     fields = common.check_fields(output, surface, fields)
     watch.lap("read")
     with use_threads(threads):
@@ -101,7 +101,7 @@ def area(
     }
     options = {name: value for name, value in options.items() if value is not None}
     mesh, fields = common.read_with_fields(input, orient, compact)
-    surface, fields = common.surface_with_fields(mesh, fields)
+    surface, fields = common.surface_with_fields(mesh, fields, input)
     fields = common.check_fields(output, surface, fields)
     watch.lap("read")
     with terminal(quiet) as bar:

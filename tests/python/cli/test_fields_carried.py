@@ -53,6 +53,26 @@ def test_fields_named_like_those_of_maps_are_left_out_with_a_word(folder, capsys
     assert "load" in sm.io.read_arrays("map.vtu").point_data
 
 
+@pytest.mark.parametrize(
+    ("command", "work"),
+    [("conformal", "conformal.map.conformal_map"), ("area", "area.map.area_map")],
+)
+def test_fields_of_tets_are_left_out_with_a_word_where_the_boundary_is_mapped(
+    command, work, folder, capsys, monkeypatch
+):
+    solid = sm.read("solid.npz")
+    done = sm.conformal_map(solid.surface)
+    monkeypatch.setattr(f"stretchmap.{work}", lambda *_, **__: done)
+    sm.write("load.npz", solid, {"load": solid.V[:, 1]}, {"density": solid.tet_volumes})
+    assert main([command, "load.npz", "-o", "map.npz", "-q"]) == 0
+    said = capsys.readouterr().err
+    assert "load.npz: the boundary is mapped, which has no tets; left out: 'density'" in said
+    loaded = sm.load_map("map.npz")
+    assert set(loaded.point_fields) == {"load"} and not loaded.cell_fields
+    assert main([command, "solid.npz", "-o", "map.npz", "-q"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_fields_the_output_has_other_types_for_are_carried(folder, capsys):
     pytest.importorskip("meshio")
     surface = sm.read("surface.ply")
