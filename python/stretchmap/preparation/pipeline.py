@@ -69,9 +69,10 @@ def prepare(
     a bridge goes, or a tunnel is filled, as far as it is hardly wider than there; the step
     ``"handles"`` says how much of the volume that is.
 
-    Of a mask the largest island is taken and its cavities are filled. Its stairs are smoothed, at
-    a level at which the surface encloses the volume of these voxels to within three per cent. The
-    step ``"fill"`` says how much of it the solid lacks; of more than a tenth there is a warning.
+    Of a mask the largest island is taken and its cavities are filled; of more than a tenth as many
+    voxels in other islands there is a warning. Its stairs are smoothed, at a level at which the
+    surface encloses the volume of these voxels to within three per cent. The step ``"fill"`` says
+    how much of it the solid lacks; of more than a tenth there is a warning.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import math
 import os
 import zipfile
@@ -31,6 +32,9 @@ from .soup import LARGEST_DEBRIS, components
 
 __all__ = ["as_affine", "holds_mask", "mask_surface", "read_mask"]
 
+_log = logging.getLogger("stretchmap")
+
+_MUCH_DEBRIS = 0.1  # of the voxels kept, may be dropped in islands without a word
 _BLUR = 0.7  # voxels; takes the stairs off
 # Of the volume, may be lost or gained by that: all of it would move the flat faces of bodies with
 # edges, which are rounded, by a tenth of a voxel.
@@ -158,10 +162,17 @@ def _largest_island(
             "the voxels of the first, and no voxel of one shares a face with one of the other; "
             "join them, or split the mask and prepare one of them"
         )
+    kept, dropped = int(filled.sum()), int(outside.sum())
+    if dropped > _MUCH_DEBRIS * kept:
+        _log.warning(
+            "prepare: of the mask the largest island is kept; the others, %d, are dropped with "
+            "%.0f %% as many voxels together: join those that belong to it",
+            np.count_nonzero(outside), 100.0 * dropped / kept,
+        )  # fmt: skip
     counts = {
-        "voxels_kept": int(filled.sum()),
-        "island_voxels_dropped": int(outside.sum()),
-        "cavity_voxels_filled": int(filled.sum() - sizes.max()),
+        "voxels_kept": kept,
+        "island_voxels_dropped": dropped,
+        "cavity_voxels_filled": kept - int(sizes.max()),
     }
     return filled, counts
 

@@ -191,6 +191,15 @@ def test_two_large_islands_are_refused_and_small_ones_dropped():
     assert mask_surface(small, np.eye(4))[2]["island_voxels_dropped"] == 4 * 4 * 3
 
 
+@pytest.mark.parametrize(("length", "share"), [(4, 21), (1, None)])
+def test_many_small_islands_are_dropped_with_a_word(length, share, caplog):
+    mask = np.concatenate([drilled(2), np.zeros_like(drilled(2))])
+    mask[-length:, ::4, 1:7:3] = mask[-length:, 2::4, 1:7:3] = True  # twelve bars
+    assert mask_surface(mask, np.eye(4))[2]["island_voxels_dropped"] == 12 * length
+    said = f"the others, 12, are dropped with {share} % as many voxels" in caplog.text
+    assert said == bool(caplog.records) == bool(share)
+
+
 def test_an_island_in_a_cavity_is_no_second_piece():
     mask = np.pad(np.ones((16, 16, 16), bool), 1)
     mask[2:-2, 2:-2, 2:-2] = np.pad(np.ones((8, 8, 8), bool), 3)
