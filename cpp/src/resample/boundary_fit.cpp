@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "stretchmap/base/parallel.hpp"
 
@@ -60,13 +61,45 @@ BoundaryFit::BoundaryFit(const PointsRef& points, const FacesRef& faces, const P
       per_side_(per_side),
       far_(far),
       bilinear_(bilinear) {
+  find_places();
   const Index s = static_cast<Index>(sample_faces.size());
+  near_.assign(places_.size() + s, 0);
   sites_.setZero(s, 3);
   site_normals_.resize(s, 3);
   for (Index j = 0; j < s; ++j) {
     const Index f = sample_faces[j];
     for (int c = 0; c < 3; ++c) sites_.row(j) += sample_weights(j, c) * points.row(faces(f, c));
     site_normals_.row(j) = normal(f, sample_weights.row(j).transpose());
+  }
+}
+
+// Corners and edges belong to several quads, and are looked at once.
+void BoundaryFit::find_places() {
+  const Index n = static_cast<Index>(quads_.rows()), per = per_side_ * per_side_;
+  const int last = per_side_ - 1;
+  std::map<std::array<Index, 3>, Index> shared;
+  place_of_.resize(n * per);
+  for (Index b = 0; b < n; ++b) {
+    for (int k = 0; k < per; ++k) {
+      const int i = k % per_side_, j = k / per_side_;
+      const bool on_i = i == 0 || i == last, on_j = j == 0 || j == last;
+      const auto corner = [&](bool high_i, bool high_j) {
+        return quads_(b, high_j ? (high_i ? 2 : 3) : (high_i ? 1 : 0));
+      };
+      const Index fresh = static_cast<Index>(places_.size());
+      Index& place = place_of_[per * b + k];
+      place = fresh;
+      if (on_i || on_j) {
+        const Index begin = corner(on_i && i == last, on_j && j == last),
+                    end = corner(on_i ? i == last : true, on_j ? j == last : true);
+        const int along = begin == end ? 0 : (on_i ? j : i);
+        const std::array<Index, 3> key = begin <= end
+                                             ? std::array<Index, 3>{begin, end, along}
+                                             : std::array<Index, 3>{end, begin, last - along};
+        place = shared.try_emplace(key, fresh).first->second;
+      }
+      if (place == fresh) places_.push_back({b, k});
+    }
   }
 }
 
@@ -85,54 +118,53 @@ RowVector3d BoundaryFit::direction(const RowVector3d& normal, const RowVector3d&
   return sum.normalized();
 }
 
-FitSamples BoundaryFit::match(const PointsRef& x) const {
+FitSamples BoundaryFit::match(const PointsRef& x) {
   FitSamples out;
-  const Index q = static_cast<Index>(quads_.rows()) * per_side_ * per_side_;
+  const Index q = static_cast<Index>(places_.size());
   const Index s = q + static_cast<Index>(sites_.rows());
   out.first_of_surface = q;
   out.corners.resize(s, 4);
   out.weights.resize(s, 4);
   out.point.resize(s, 3);
   out.normal.resize(s, 3);
-  out.share.resize(s);
+  out.share.setZero(s);
   out.distance.resize(s);
   match_quads(x, out);
   match_surface(x, out);
   return out;
 }
 
-void BoundaryFit::match_quads(const PointsRef& x, FitSamples& out) const {
+void BoundaryFit::match_quads(const PointsRef& x, FitSamples& out) {
   const Index n = static_cast<Index>(quads_.rows()), per = per_side_ * per_side_;
+  const Index q = out.first_of_surface;
   const double step = 1.0 / (per_side_ - 1);
-  for_chunks(n, kSamplesPerChunk / per + 1, [&](Index begin, Index end) {
-    for (Index b = begin; b < end; ++b) {
-      const RowVector3d d1 = x.row(quads_(b, 2)) - x.row(quads_(b, 0)),
-                        d2 = x.row(quads_(b, 3)) - x.row(quads_(b, 1));
-      const double area = 0.5 * d1.cross(d2).norm();
-      Index hint = 0;
-      for (Index k = 0; k < per; ++k) {
-        const double s = (k % per_side_) * step, t = (k / per_side_) * step;
-        const RowVector4d w((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t);
-        Vector3d here = Vector3d::Zero();
-        for (int c = 0; c < 4; ++c) here += w[c] * x.row(quads_(b, c)).transpose();
-        const maps::Foot foot = surface_.closest(here, hint);
-        hint = foot.face;
-        const Index j = per * b + k;
-        out.corners.row(j) = quads_.row(b);
-        out.weights.row(j) = w;
-        out.point.row(j) = foot.point.transpose();
-        out.normal.row(j) =
-            direction(normal(foot.face, foot.weights), here.transpose() - out.point.row(j));
-        out.distance[j] = std::sqrt(foot.squared_distance);
-        out.share[j] = area / per;
-      }
+  for_chunks(q, kSamplesPerChunk, [&](Index begin, Index end) {
+    for (Index j = begin; j < end; ++j) {
+      const Place& place = places_[j];
+      const double s = (place.sample % per_side_) * step, t = (place.sample / per_side_) * step;
+      const RowVector4d w((1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t);
+      Vector3d here = Vector3d::Zero();
+      for (int c = 0; c < 4; ++c) here += w[c] * x.row(quads_(place.quad, c)).transpose();
+      const maps::Foot foot = surface_.closest(here, near_[j]);
+      near_[j] = foot.face;
+      out.corners.row(j) = quads_.row(place.quad);
+      out.weights.row(j) = w;
+      out.point.row(j) = foot.point.transpose();
+      out.normal.row(j) =
+          direction(normal(foot.face, foot.weights), here.transpose() - out.point.row(j));
+      out.distance[j] = std::sqrt(foot.squared_distance);
     }
   });
-  const Index q = out.first_of_surface;
+  for (Index b = 0; b < n; ++b) {
+    const RowVector3d d1 = x.row(quads_(b, 2)) - x.row(quads_(b, 0)),
+                      d2 = x.row(quads_(b, 3)) - x.row(quads_(b, 1));
+    const double area = 0.5 * d1.cross(d2).norm();
+    for (Index k = 0; k < per; ++k) out.share[place_of_[per * b + k]] += area / per;
+  }
   out.share.head(q) /= out.share.head(q).sum();
 }
 
-void BoundaryFit::match_surface(const PointsRef& x, FitSamples& out) const {
+void BoundaryFit::match_surface(const PointsRef& x, FitSamples& out) {
   const Index n = static_cast<Index>(x.rows()), q = static_cast<Index>(quads_.rows());
   Points points(n + q, 3);
   points.topRows(n) = x;
@@ -147,11 +179,11 @@ void BoundaryFit::match_surface(const PointsRef& x, FitSamples& out) const {
   const maps::SurfaceTree grid(points, fans);
   const Index s = static_cast<Index>(sites_.rows()), first = out.first_of_surface;
   for_chunks(s, kSamplesPerChunk, [&](Index begin, Index end) {
-    Index hint = 0;
     for (Index i = begin; i < end; ++i) {
-      const maps::Foot foot = grid.closest(sites_.row(i).transpose(), hint);
-      hint = foot.face;
-      const Index quad = foot.face / 4, c = foot.face % 4, j = first + i;
+      const Index j = first + i;
+      const maps::Foot foot = grid.closest(sites_.row(i).transpose(), near_[j]);
+      near_[j] = foot.face;
+      const Index quad = foot.face / 4, c = foot.face % 4;
       RowVector4d w = RowVector4d::Constant(0.25 * foot.weights[2]);
       w[c] += foot.weights[0];
       w[(c + 1) % 4] += foot.weights[1];

@@ -10,6 +10,8 @@
 // long and warped ones are far from: where it matters points are moved on to the quad itself.
 #pragma once
 
+#include <vector>
+
 #include "stretchmap/maps/surface_tree.hpp"
 
 namespace stretchmap::resample {
@@ -35,7 +37,7 @@ class BoundaryFit {
   // 3),
   //        each standing for the same area.
   // \param quads (q, 4) of the grid, seen from outside; per_side^2 samples are taken of each,
-  //        corners among them, per_side > 1.
+  //        those on its edges and corners together with its neighbors, per_side > 1.
   // \param far gaps this long are closed half-way between the normal and their own direction.
   // \param bilinear closest points of the grid are moved from the triangles to the quads.
   BoundaryFit(const PointsRef& points, const FacesRef& faces, const PointsRef& normals,
@@ -43,20 +45,28 @@ class BoundaryFit {
               const TetsRef& quads, int per_side, double far, bool bilinear = false);
 
   // \param x points of the grid.
-  // \return their samples.
-  FitSamples match(const PointsRef& x) const;
+  // \return their samples. Each begins to look for its closest point where it was the last time.
+  FitSamples match(const PointsRef& x);
 
  private:
   Eigen::RowVector3d normal(Index face, const Eigen::Vector3d& weights) const;
   Eigen::RowVector3d direction(const Eigen::RowVector3d& normal,
                                const Eigen::RowVector3d& gap) const;
-  void match_quads(const PointsRef& x, FitSamples& out) const;
-  void match_surface(const PointsRef& x, FitSamples& out) const;
+  void find_places();
+  void match_quads(const PointsRef& x, FitSamples& out);
+  void match_surface(const PointsRef& x, FitSamples& out);
 
   maps::SurfaceTree surface_;
   Points normals_;
   Points sites_, site_normals_;
   Tets quads_;
+  struct Place {  // the first of the quads that have this sample, and its number there
+    Index quad;
+    int sample;
+  };
+  std::vector<Place> places_;
+  std::vector<Index> place_of_;  // (q per_side^2)
+  std::vector<Index> near_;      // of each sample the face closest to it the last time
   int per_side_;
   double far_;
   bool bilinear_;
