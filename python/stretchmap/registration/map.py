@@ -42,6 +42,7 @@ __all__ = ["register"]
 
 _log = logging.getLogger("stretchmap")
 
+_AGAIN = 0.1  # share of the time that a last attempt with the boundary held has at least
 
 @takes_threads
 def register(
@@ -147,6 +148,8 @@ def register(
     for mesh in (source, target):
         mesh.require_solid_torus()
     marks = _landmarks(landmarks, source, target)
+    options = FillOptions() if options is None else options
+    budget = Budget.of(options.time_limit, source.n_tets)
     seconds: dict[str, float] = {}
     clock = time.perf_counter()
     mirrored = mirrored_landmarks(source.V[marks.source], target.V[marks.target])
@@ -159,9 +162,7 @@ def register(
     except LandmarkError as error:
         raise LandmarkError(f"{error}; {mirrored}" if mirrored else str(error), error.ids) from None
     seconds["boundary"] = time.perf_counter() - clock
-    options = FillOptions() if options is None else options
     clock, filled = time.perf_counter(), None
-    budget = Budget.of(options.time_limit, embedded.split.solid.n_tets)
     if boundary == "glide" and not len(marks):
         filled = fill_either_way(source, target, embedded, gauge, options, budget, progress)
     if filled is None:
@@ -179,7 +180,7 @@ def register(
         )  # fmt: skip
     certificate = certify(filled.outcome.problem.solid, _image(filled))
     if not certificate.certified and filled.outcome.glided:  # a matter of rounding
-        again = Budget.of(options.time_limit, embedded.split.solid.n_tets)
+        again = Budget(max(budget.left, _AGAIN * budget.seconds))
         filled = fill_boundary(
             filled.boundary, filled.gauge, target, options,
             pinned=marks.source, glide=False, budget=again, progress=progress,

@@ -201,15 +201,26 @@ def _draw(
                 moved[ids] = y[ids] + left
             points_there, value = problem.place(moved)
             if value < energy + _RISE:
-                y, points, energy = moved, points_there, value
                 break
             alpha *= 0.5
+        least, more = max(alpha, _SHORT), 1.0
+        while alpha < _FAR and more > least:
+            # Few faces may be in the way of all: the others go ahead, and these have room then.
+            parted = y + problem.unfolded(y, more * step)
+            points_parted, value_parted = problem.place(parted)
+            if value_parted < energy + _RISE:
+                alpha, moved, points_there, value = more, parted, points_parted, value_parted
+                break
+            more *= 0.5
+        if alpha >= _SHORTEST:
+            y, points, energy = moved, points_there, value
         history.append(
             IterationRecord(
                 stage="match", iteration=len(history), energy=energy, step=alpha, flips=0
             )
         )
-        stuck = stuck + 1 if alpha < _SHORT else 0
+        remaining = np.abs(wrapped(goals - y[ids])).sum()
+        stuck = stuck + 1 if remaining > (1.0 - _SHORT) * np.abs(left).sum() else 0
         if alpha < _FAR:
             y, points, energy = _relaxed(problem, y, points, energy)
     far = int(np.argmax(np.abs(left).max(axis=1)))

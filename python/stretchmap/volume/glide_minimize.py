@@ -4,11 +4,16 @@ As in `minimize`, but the energy has kinks at the edges of the mesh. Along smoot
 far, until pressure against a sloping face spoils them; along those of the faces they always lead
 down, but are cut short by kinks. So the other ones are taken after every short step.
 Both nearly flatten single elements on the way: these are opened after each, see `Relaxation`.
+
+Faces of the boundary that all look outward may yet cross each other where the mesh is thin. That is
+looked for every few steps, and ends them where they were before.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +24,26 @@ from .glide_targets import GlideTargets
 from .minimize import IDLE, Minimized, grown
 from .model import History, SolidModel
 
-__all__ = ["minimize_on_mesh"]
+__all__ = ["Glided", "minimize_on_mesh"]
 
 _SHORT = 0.5  # a step that asks for the other axes
+_LOOK = 5  # steps between two looks for crossing faces, of which each takes a fifth of a step
+
+
+@dataclass(frozen=True, eq=False)
+class Glided(Minimized):
+    """Where the boundary has glided to without crossing itself.
+
+    Attributes
+    ----------
+    weight : float
+        Lambda there.
+    crossing : ndarray of intp
+        Vertices of faces that cross each other a few steps on; none if it did not end for that.
+    """
+
+    weight: float = 0.0
+    crossing: NDArray[np.intp] = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
 
 class _Minimizers:
@@ -50,8 +72,14 @@ class _Minimizers:
 
 
 def minimize_on_mesh(
-    model: SolidModel, x: NDArray[np.float64], history: History, *, start: float
-) -> Minimized:
+    model: SolidModel,
+    x: NDArray[np.float64],
+    history: History,
+    *,
+    start: float,
+    targets: GlideTargets,
+    crossing: Callable[[NDArray[np.float64]], NDArray[np.intp]],
+) -> Glided:
     """Newton steps with lambda growing from ``start`` until volumes are kept as is asked.
 
     Parameters
@@ -59,14 +87,18 @@ def minimize_on_mesh(
     model : SolidModel
         With a ``ground``.
     x : ndarray, shape (n, 3)
-        Without inverted tets and folded boundary faces.
+        Without inverted tets, and folded or crossing boundary faces.
     history : History
         Gets a record per step, of the stage ``"glide"``.
     start : float
+    targets : GlideTargets
+        May have learned before.
+    crossing : callable
+        Boundary vertices of faces that cross others.
     """
     o, weight, idle = model.options, start, 0
-    minimizers, targets = _Minimizers(model, x), GlideTargets(model)
-    relaxation = Relaxation(model)
+    minimizers, relaxation = _Minimizers(model, x), Relaxation(model)
+    sound, bad, kept = (x, weight), np.empty(0, np.intp), False
     linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg)
     reason, converged = "most iterations done", False
     for iteration in range(1, o.glide_iter + 1):
@@ -85,8 +117,15 @@ def minimize_on_mesh(
             "glide", iteration, x, energy=after, step=step.alpha, residual=step.decrement,
             total=o.glide_iter,
         )  # fmt: skip
-        if model.kept(x):
-            return Minimized(x, True, "volumes are kept", newton)
+        kept = model.kept(x)
+        if kept:
+            reason, converged = "volumes are kept", True
+            break
+        if iteration % _LOOK == 0:
+            bad = crossing(x)
+            if len(bad):
+                break
+            sound = x, weight
         if step.alpha < _SHORT:
             minimizers.switch(x)
         elif weight < o.volume_weight:
@@ -98,5 +137,9 @@ def minimize_on_mesh(
         if idle >= IDLE or targets.stalled:
             reason, converged = "volumes are kept as far as can be", weight == o.volume_weight
             break
-    best = x if targets.best is None else targets.best
-    return Minimized(best, converged, reason, minimizers.chosen)
+    if not len(bad):
+        best = x if kept or targets.best is None else targets.best
+        bad = crossing(best)
+    if len(bad):
+        return Glided(sound[0], False, reason, minimizers.chosen, weight=sound[1], crossing=bad)
+    return Glided(best, converged, reason, minimizers.chosen, weight=weight)

@@ -64,6 +64,10 @@ class GlideTargets:
         asked: NDArray[np.float64] = model.inflating(enclosed) * more
         return asked
 
+    def forget_best(self) -> None:
+        """Where volumes were kept best is of no use; what was learned there is."""
+        self.best, self._least, self._since, self._stale = None, math.inf, 0, True
+
     def learn(self, x: NDArray[np.float64]) -> None:
         """Ask for more where there is too little at ``x``, and for less where there is too much."""
         ratios = self._model.ring_ratios(x)

@@ -2,19 +2,22 @@
 
 A mesh is smooth on the whole only. A face of the boundary image that lies across a sharp edge may
 seem folded without being so: its vertices are held until it does no longer. And faces that are
-graphs over the mesh may yet cross each other where it is thin: those are held next time.
+graphs over the mesh may yet cross each other where it is thin: those are held from where they did
+not on.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import logging
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
 from .glide_minimize import minimize_on_mesh
+from .glide_targets import GlideTargets
 from .minimize import Minimized
 from .model import History
 from .options import FillOptions
@@ -25,7 +28,7 @@ __all__ = ["glide_on_mesh", "untangle_on_mesh"]
 
 _log = logging.getLogger("stretchmap")
 
-_TRIES, _RELEASES = 4, 2
+_TRIES, _RELEASES = 8, 2
 _MOST_PAIRS = 10_000
 # What is amiss far apart is mended by moving all between, which a coarse solve hardly sees.
 _CG_TOL = 0.01
@@ -63,16 +66,25 @@ def glide_on_mesh(
     )
     x, first = problem.x, min(options.frozen_weight, _START)
     held, found = _folded(problem, options, x), None
+    targets = GlideTargets(problem.model(options))
     tries = releases = 0
-    while tries < _TRIES:
+    while True:
         history.model = dataclasses.replace(problem, held=held).model(options)
-        done = minimize_on_mesh(history.model, x, history, start=first)
-        crossing = _crossing(problem, done.x)
-        if len(crossing):
+        done = minimize_on_mesh(
+            history.model, x, history,
+            start=first, targets=targets, crossing=partial(_crossing, problem),
+        )  # fmt: skip
+        if len(done.crossing):
             if found is not None:
                 break  # what was let go is at fault
-            _log.info("%d vertices of the gliding boundary cross: held", len(crossing))
-            held, tries = np.union1d(held, crossing), tries + 1
+            if tries == _TRIES or history.budget.spent:
+                reason = "the boundary would cross itself" if tries == _TRIES else done.reason
+                found = None if done.x is problem.x else dataclasses.replace(done, reason=reason)
+                break
+            _log.info("%d vertices of the gliding boundary cross: held", len(done.crossing))
+            held, tries = np.union1d(held, done.crossing), tries + 1
+            x, first = done.x, done.weight
+            targets.forget_best()
             continue
         found, x = done, done.x
         if history.model.kept(x):
@@ -81,6 +93,7 @@ def glide_on_mesh(
         if len(still) == len(held) or releases == _RELEASES or history.budget.spent:
             break
         held, first, releases = still, options.volume_weight, releases + 1
+        targets = GlideTargets(problem.model(options))
     return found
 
 
