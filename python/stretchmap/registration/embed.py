@@ -56,6 +56,15 @@ def split_long_edges(split: SplitSolid, flat: FlatSurface) -> tuple[SplitSolid, 
         split, flat = _split(split, flat, (edges[bad], np.full(len(bad), 0.5), middles))
 
 
+def halve_edges_once(split: SplitSolid, flat: FlatSurface) -> tuple[SplitSolid, FlatSurface]:
+    """Halve boundary edges, as above, the longest of the surface first and none next to another."""
+    edges = flat.surface.edges
+    ends = flat.surface.V[edges]
+    order = np.argsort(-np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), kind="stable")
+    middles = flat.turns[edges[:, 0]] + 0.5 * flat.ways(edges)
+    return _split(split, flat, (edges[order], np.full(len(order), 0.5), middles[order]))
+
+
 def unfold_boundary(
     split: SplitSolid,
     flat: FlatSurface,

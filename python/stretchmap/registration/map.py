@@ -30,11 +30,17 @@ from ..mesh.refinement import Refinement
 from ..mesh.split_edges import SplitSolid
 from ..volume.options import FillOptions, check_prescribed
 from .affine import affine_landmark_map
-from .embed import EmbeddedBoundary, embed_boundary, split_long_edges, unfold_boundary
+from .embed import (
+    EmbeddedBoundary,
+    embed_boundary,
+    halve_edges_once,
+    split_long_edges,
+    unfold_boundary,
+)
 from .filling import Filled, fill_boundary, fill_either_way
 from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
-from .match import match_surfaces
+from .match import Match, match_surfaces
 from .mirror import mirrored_landmarks
 from .result import LandmarkMap, Registration
 
@@ -43,6 +49,7 @@ __all__ = ["register"]
 _log = logging.getLogger("stretchmap")
 
 _AGAIN = 0.1  # share of the time that a last attempt with the boundary held has at least
+
 
 @takes_threads
 def register(
@@ -74,12 +81,12 @@ def register(
         ``glide_distortion`` of `FillOptions`). ``"frozen"``: they stay where the matching of
         the surfaces put them, which is closer to where a smooth deformation that does not keep
         volumes would; but where nothing inside can untangle tets, those round them give way. A map
-        that need not glide, or that gliding would make cross itself, is kept frozen; the result
-        says which it is.
+        that need not glide, or that gliding would make cross itself at once, is kept frozen; the
+        result says which it is.
     landmark_map : {"smooth", "affine"}
         How landmarks are reached after the surfaces were matched for least distortion of area and
         shape. ``"smooth"``: by the same matching with the landmarks held, kept free of folds by a
-        barrier. ``"affine"``: by the paper's piecewise-affine map on a Delaunay triangulation of
+        barrier, if need be with edges of the boundary halved. ``"affine"``: by the paper's piecewise-affine map on a Delaunay triangulation of
         the landmarks, here a periodic one.
     max_iter : int
         Most steps of the surface matching, twice if landmarks are held in it. With 0 and
@@ -228,9 +235,18 @@ def _boundary_map(
     gauge = choose_gauge(first, second, pairs)
     split, first = split_long_edges(SplitSolid.of(source), first.changed(gauge))
     held = pairs if landmark_map == "smooth" else pairs[:0]
-    match = match_surfaces(
-        first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
-    )
+
+    def matched() -> Match:
+        return match_surfaces(
+            first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
+        )
+
+    try:
+        match = matched()
+    except LandmarkError as error:
+        _log.info("%s: once more with edges of the boundary halved", error)
+        split, first = halve_edges_once(split, first)
+        match = matched()
     image, points = first.at(match.y), match.points
     if landmark_map == "affine":
         starts, ends = image.turns[pairs[:, 0]], second.turns[pairs[:, 1]]

@@ -10,7 +10,7 @@ import pytest
 import stretchmap as sm
 from stretchmap import _core, samples
 from stretchmap.errors import KindError, OptionError
-from stretchmap.volume import engine, ground, untangle_order
+from stretchmap.volume import engine, glide_minimize, ground, untangle_order
 from stretchmap.volume.options import FillOptions
 from stretchmap.volume.problem import VolumeProblem
 from stretchmap.volume.untangle import stuck_tets, untangle_patches
@@ -124,14 +124,22 @@ def test_the_frozen_map_is_kept_where_gliding_crosses(pair, maps, monkeypatch, c
     assert result.distortion.ring_std == pytest.approx(maps["frozen"].distortion.ring_std, rel=0.05)
 
 
-def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
+@pytest.fixture
+def to_glide(pair, maps):
     held = maps["frozen"]
-    problem = VolumeProblem.of(
+    return VolumeProblem.of(
         held.mesh, held.image, ground=pair.target.surface, refine=None, warm=True
     )
-    model = problem.model(FillOptions())
-    history = engine.History(model, engine.Budget(60.0))
-    some = held.mesh.boundary_vertices[[3, 50, 200]].astype(np.intp)
+
+
+def history_of(problem):
+    return engine.History(problem.model(FillOptions()), engine.Budget(60.0))
+
+
+def test_vertices_that_cross_are_held(to_glide, monkeypatch):
+    problem, history = to_glide, history_of(to_glide)
+    skin = problem.solid.boundary_vertices
+    some = skin[[3, 50, 200]].astype(np.intp)
     answers = [some]
     true_crossing = ground._crossing
     monkeypatch.setattr(
@@ -142,12 +150,32 @@ def test_vertices_that_cross_are_held(pair, maps, monkeypatch):
     done = ground.glide_on_mesh(problem, options, history)
     assert done is not None
     assert np.array_equal(done.x[some], problem.x[some])
-    assert not np.array_equal(
-        done.x[held.mesh.boundary_vertices], problem.x[held.mesh.boundary_vertices]
-    )
+    assert not np.array_equal(done.x[skin], problem.x[skin])
     assert not len(true_crossing(problem, done.x))
     monkeypatch.setattr(ground, "_crossing", lambda p, x: some)
     assert ground.glide_on_mesh(problem, options, history) is None
+
+
+def test_they_are_held_from_where_they_did_not_cross_on(to_glide, monkeypatch):
+    """Once or, where they cross whatever is held, till then."""
+    some = to_glide.solid.boundary_vertices[[3, 50, 200]].astype(np.intp)
+    monkeypatch.setattr(glide_minimize, "_LOOK", 1)
+    monkeypatch.setattr(ground, "_RELEASES", 0)
+    options = dataclasses.replace(FillOptions(), glide_iter=3)
+    for at_all in (False, True):
+        seen = []
+
+        def crossing(problem, x, seen=seen, at_all=at_all):
+            seen.append(x)
+            return some if len(seen) == 2 or (at_all and len(seen) > 1) else some[:0]
+
+        monkeypatch.setattr(ground, "_crossing", crossing)
+        done = ground.glide_on_mesh(to_glide, options, history_of(to_glide))
+        assert np.array_equal(done.x[some], seen[0][some])
+        assert not np.array_equal(done.x[some], to_glide.x[some])
+        assert np.array_equal(done.x, seen[0]) == at_all
+        assert done.converged is False
+        assert ("cross itself" in done.reason) == at_all
 
 
 def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps, monkeypatch):
