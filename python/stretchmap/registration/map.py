@@ -86,8 +86,8 @@ def register(
     landmark_map : {"smooth", "affine"}
         How landmarks are reached after the surfaces were matched for least distortion of area and
         shape. ``"smooth"``: by the same matching with the landmarks held, kept free of folds by a
-        barrier, if need be with edges of the boundary halved. ``"affine"``: by the paper's piecewise-affine map on a Delaunay triangulation of
-        the landmarks, here a periodic one.
+        barrier, if need be with edges of the boundary halved. ``"affine"``: by the paper's
+        piecewise-affine map on a Delaunay triangulation of the landmarks, here a periodic one.
     max_iter : int
         Most steps of the surface matching, twice if landmarks are held in it. With 0 and
         ``landmark_map="affine"`` the boundary map is the paper's, but for the choice of the flat
