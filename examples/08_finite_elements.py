@@ -83,7 +83,7 @@ fine = heat(tets.refined(1), ElementTetP2())
 runs = {"tets": [], "hexahedra": []}
 for mesh in (tets, tets.refined(1)):
     runs["tets"].append((mesh, *heat(mesh, ElementTetP1())))
-for sections, block, rings in ((24, 2, 1), (36, 3, 1), (48, 4, 2)):
+for sections, block, rings in ((20, 2, 1), (30, 3, 1), (40, 4, 1)):
     grid = sm.hex_mesh(result, sections=sections, block=block, rings=rings)
     assert grid.n_invalid == 0
     mesh = from_meshio(grid.to_meshio())

@@ -22,7 +22,7 @@ def limb(rings: int) -> sm.TriMesh:
     return with_limb(sm.samples.torus_surface(36, 18), rings, 0.12)
 
 
-@pytest.mark.parametrize(("rings", "time_limit"), [(30, 0.02), (130, 0.005)])
+@pytest.mark.parametrize(("rings", "time_limit"), [(30, 0.02), (130, 0.004)])
 def test_a_limb_is_mapped_without_a_fold(rings, time_limit):
     """The longest, which is spread in the flat chart, with as many more faces as a quarter of the
     time allows."""
