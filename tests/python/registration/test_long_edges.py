@@ -7,6 +7,7 @@ import pytest
 
 import stretchmap as sm
 from shapes import cubes, with_limb
+from stretchmap import _core
 from stretchmap.errors import SolverError
 from stretchmap.mesh.split_edges import SplitSolid
 from stretchmap.registration.embed import split_long_edges
@@ -49,3 +50,29 @@ def test_a_limb_that_a_flat_torus_shrinks_to_nothing_is_named():
     with pytest.raises(SolverError, match=r"of the target lie so far out .* coarser") as caught:
         FlatSurface.of(surface, "target")
     assert len(caught.value.ids)
+
+
+def test_limbs_that_the_conformal_map_loses_in_rounding_keep_their_tips():
+    surface = with_limb(sm.samples.torus_surface(36, 18), 130, 0.12)
+    conformal = sm.conformal_map(surface)
+    chart = _core.area.SurfaceChart(surface.topology, conformal.forms)
+    assert not (_core.area.turn_areas(chart, conformal.turns) > 0.0).all()
+    flat = FlatSurface.of(surface)
+    ratios = _core.area.turn_areas(flat.chart, flat.turns) * surface.area / surface.face_areas
+    assert 0.005 < ratios.min() and ratios.max() < 30.0
+
+
+def test_stretch_energy_steps_that_break_down_are_left_off(monkeypatch):
+    surface = sm.samples.torus_surface(24, 12)
+    least = FlatSurface.of(surface).turns
+
+    class BreaksDown:
+        def __init__(self, *given):
+            self.turns = given[-1]
+
+        def step(self):
+            raise SolverError("the matrix is not positive definite")
+
+    monkeypatch.setattr(_core.area, "SurfaceSem", BreaksDown)
+    away = FlatSurface.of(surface).turns - least
+    assert np.ptp(away, axis=0).max() < 0.01
