@@ -38,6 +38,7 @@ _TOL = 5e-4  # and takes many steps that gain little each
 _START = 0.2
 _GOAL = 1e3  # and to end with: what is left to be had is asked for on top, see `GlideTargets`
 _REACHES = (1, 2, 4)  # rings of vertices round inverted tets that may glide
+_CROSSINGS = 3  # times those that cross for it are held instead
 
 
 def glide_on_mesh(
@@ -98,7 +99,7 @@ def glide_on_mesh(
 
 
 def untangle_on_mesh(
-    problem: VolumeProblem, options: FillOptions, history: History
+    problem: VolumeProblem, options: FillOptions, history: History, *, reaches: slice = slice(None)
 ) -> NDArray[np.float64] | None:
     """Untangle what nothing inside can, the boundary round it gliding on ``problem.ground``.
 
@@ -108,25 +109,34 @@ def untangle_on_mesh(
         Its image with few inverted tets, its boundary without crossing faces.
     options : FillOptions
     history : History
+    reaches : slice
+        Of how far round the tets it may, from near to far.
 
     Returns
     -------
     ndarray, shape (n, 3), or None
         Without inverted tets and crossing faces; None if that could not be had.
     """
-    model = problem.model(options)
-    for rings in _REACHES:
-        x, fewest = problem.x, len(model.T) + 1
-        while not history.budget.spent:
-            # Folded faces, too: where some tets cannot be untangled, it is these that hold them.
-            left = stuck_tets(model, x, glide=True)
-            if not 0 < len(left) < fewest:
+    held = problem.held
+    for rings in _REACHES[reaches]:
+        for _ in range(_CROSSINGS):
+            model = dataclasses.replace(problem, held=held).model(options)
+            x, fewest = problem.x, len(model.T) + 1
+            while not history.budget.spent:
+                # Folded faces, too: where some tets cannot be untangled, it is these that hold
+                # them.
+                left = stuck_tets(model, x, glide=True)
+                if not 0 < len(left) < fewest:
+                    break
+                fewest = len(left)
+                x = untangle_patches(model, x, left, rings=rings, glide=True, budget=history.budget)
+            if len(stuck_tets(model, x, glide=False)):
                 break
-            fewest = len(left)
-            x = untangle_patches(model, x, left, rings=rings, glide=True, budget=history.budget)
-        if not len(stuck_tets(model, x, glide=False)) and not len(_crossing(problem, x)):
-            _log.info("inverted tets untangled by moving the boundary round them")
-            return x
+            crossing = _crossing(problem, x)
+            if not len(crossing):
+                _log.info("inverted tets untangled by moving the boundary round them")
+                return x
+            held = np.union1d(held, crossing)
     return None
 
 

@@ -121,8 +121,9 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
     Where far too many tets are inverted for patches, all are begun with once more, with more
     vertices.
 
-    A boundary that is going to glide on a mesh gives way before that. On a torus all of it would
-    have to be untangled once more for the sake of a few tets, to which more vertices are cheaper.
+    A boundary that is going to glide on a mesh gives way before that, next to them before they get
+    more vertices, farther round them after. On a torus all of it would have to be untangled once
+    more for the sake of a few tets, to which more vertices are cheaper.
     """
     history = run.history
     begin, begun = run.x, run.budget.left
@@ -155,8 +156,17 @@ def _untangle_inside(run: Run, *, glide: bool) -> NDArray[np.intp]:
         stuck = _patched_gliding(run, stuck, rings=_RINGS[-1:], share=_WIDELY)
     if not len(stuck):
         return stuck
-    if run.on_mesh and freed(run):
-        return stuck[:0]
+    if run.on_mesh:
+        if freed(run, slice(1)):
+            return stuck[:0]
+        before = run.problem
+        if len(stuck) <= _FEW_STUCK and before.refinement is not None:
+            _halve(run, crowded_edges(before.solid, stuck), stuck)
+            if not len(_patched(run, glide=False, rings=_NARROW)):
+                return stuck[:0]
+            run.take(before)
+        if freed(run, slice(1, None)):
+            return stuck[:0]
     if run.hasty:
         return stuck
     before = run.problem
@@ -285,11 +295,11 @@ def _patched_gliding(
     return stuck
 
 
-def freed(run: Run) -> bool:
+def freed(run: Run, reaches: slice = slice(None)) -> bool:
     """Whether the boundary, giving way on its mesh, lets go what nothing inside untangles."""
     if run.problem.ground is None:
         return False
-    freed = untangle_on_mesh(run.problem, run.options, run.history)
+    freed = untangle_on_mesh(run.problem, run.options, run.history, reaches=reaches)
     if freed is not None:
         run.x = freed
     return freed is not None

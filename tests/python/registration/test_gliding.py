@@ -10,6 +10,8 @@ import pytest
 import stretchmap as sm
 from stretchmap import _core, samples
 from stretchmap.errors import KindError, OptionError
+from stretchmap.mesh.refinement import Refinement
+from stretchmap.mesh.split_edges import SplitSolid
 from stretchmap.volume import engine, glide_minimize, ground, untangle_order
 from stretchmap.volume.options import FillOptions
 from stretchmap.volume.problem import VolumeProblem
@@ -178,7 +180,8 @@ def test_they_are_held_from_where_they_did_not_cross_on(to_glide, monkeypatch):
         assert ("cross itself" in done.reason) == at_all
 
 
-def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps, monkeypatch):
+@pytest.fixture
+def drawn_past(pair, maps):
     """A boundary vertex is drawn past its neighbor: what lies below cannot be untangled."""
     held, surface = maps["frozen"], maps["frozen"].mesh.surface
     ids, image = held.mesh.boundary_vertices, held.image.copy()
@@ -191,18 +194,23 @@ def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps, monke
     image[ids[vertex]] = tree.closest(past[None])[0][0]
     pinned = pair.source_landmarks.astype(np.int32)
     problem = VolumeProblem.of(held.mesh, image, ground=goal, pinned=pinned, refine=None, warm=True)
-    options, model = FillOptions(), problem.model(FillOptions())
-    history = engine.History(model, engine.Budget(60.0))
+    return problem, ids[vertex]
+
+
+def test_the_boundary_gives_way_where_nothing_inside_untangles(drawn_past, monkeypatch):
+    problem, vertex = drawn_past
+    ids, pinned, mesh = problem.solid.boundary_vertices, problem.pinned, problem.solid
+    options, model, history = FillOptions(), problem.model(FillOptions()), history_of(problem)
     stuck = stuck_tets(model, problem.x, glide=False)
     inside = untangle_patches(
         model, problem.x, stuck, rings=4, glide=False, budget=engine.Budget(60.0)
     )
     assert len(stuck) and len(stuck_tets(model, inside, glide=False))
     x = ground.untangle_on_mesh(problem, options, history)
-    assert x is not None and sm.certify(held.mesh, x).certified
+    assert x is not None and sm.certify(mesh, x).certified
     assert np.array_equal(x[pinned], problem.x[pinned])
     moved = (x != problem.x).any(axis=1)
-    assert moved[ids[vertex]] and moved.mean() < 0.5
+    assert moved[vertex] and moved.mean() < 0.5
     still = dataclasses.replace(problem, pinned=ids.astype(np.intp))
     assert ground.untangle_on_mesh(still, options, history) is None
 
@@ -215,8 +223,44 @@ def test_the_boundary_gives_way_where_nothing_inside_untangles(pair, maps, monke
 
     monkeypatch.setattr(untangle_order, "untangle_whole", counted)
     outcome = engine.solve(problem, options, glide=True)
-    assert sm.certify(held.mesh, outcome.problem.x).certified
+    assert sm.certify(mesh, outcome.problem.x).certified
     assert thorough and not any(thorough)
+
+
+def test_what_crosses_for_it_is_held_instead(drawn_past, monkeypatch):
+    problem, vertex = drawn_past
+    skin = problem.solid.boundary_vertices
+    free = ground.untangle_on_mesh(problem, FillOptions(), history_of(problem))
+    moved = np.setdiff1d(skin[(free != problem.x)[skin].any(axis=1)], vertex)
+    some, true_crossing = moved[:1].astype(np.intp), ground._crossing
+    answers = [some]
+    monkeypatch.setattr(
+        ground, "_crossing", lambda p, x: answers.pop() if answers else true_crossing(p, x)
+    )
+    x = ground.untangle_on_mesh(problem, FillOptions(), history_of(problem))
+    assert sm.certify(problem.solid, x).certified and not answers
+    assert np.array_equal(x[some], problem.x[some]) and len(some)
+
+
+def test_vertices_are_added_before_it_gives_way_far_round(drawn_past, monkeypatch):
+    """And taken back where they do not help."""
+    problem = drawn_past[0]
+    problem = dataclasses.replace(problem, refinement=Refinement.of(SplitSolid.of(problem.solid)))
+    reaches, halved = [], []
+    free, halve = ground.untangle_on_mesh, untangle_order._halve
+
+    def freed(*given, reaches=slice(None), asked=reaches):
+        asked.append((reaches, len(halved)))
+        return free(*given, reaches=reaches) if reaches == slice(1, None) else None
+
+    monkeypatch.setattr(untangle_order, "untangle_on_mesh", freed)
+    monkeypatch.setattr(
+        untangle_order, "_halve", lambda *given: (halved.append(given[1]), halve(*given))
+    )
+    outcome = engine.solve(problem, FillOptions(), glide=True)
+    assert reaches[:2] == [(slice(1), 0), (slice(1, None), 1)] and len(halved) == 1
+    assert outcome.problem.solid is problem.solid
+    assert sm.certify(problem.solid, outcome.problem.x).certified
 
 
 def test_targets_ask_for_what_is_missing_and_no_more(pair, maps):
