@@ -37,7 +37,8 @@ _TOL = 5e-4  # and takes many steps that gain little each
 # there; volumes alone drive it into the nearest jam.
 _START = 0.2
 _GOAL = 1e3  # and to end with: what is left to be had is asked for on top, see `GlideTargets`
-_REACHES = (1, 2, 4)  # rings of vertices round inverted tets that may glide
+# Rings of vertices round inverted tets that may glide.
+_REACHES: tuple[int, ...] = (1, 2, 4)
 _CROSSINGS = 3  # times those that cross for it are held instead
 
 

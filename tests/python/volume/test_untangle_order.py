@@ -85,7 +85,7 @@ def test_a_boundary_on_a_mesh_gives_way_before_edges_are_halved(monkeypatch, on_
     monkeypatch.setattr(order, "untangle_whole", lambda _, x, *a, **k: Untangled(x, 3, -1.0))
     monkeypatch.setattr(order, "stuck_tets", lambda *_, **__: np.arange(3))
     monkeypatch.setattr(order, "_patched", lambda *_, **__: np.arange(3))
-    monkeypatch.setattr(order, "freed", lambda run: done.append("freed") or True)
+    monkeypatch.setattr(order, "freed", lambda run, reaches: done.append("freed") or True)
 
     def halved(run, stuck, *, glide):
         done.append("halved")
