@@ -22,8 +22,9 @@ from ..mesh.meshes import TriMesh
 _log = logging.getLogger("stretchmap")
 
 _SEM_STEPS = 10
-_FLAT_STEPS, _FLAT_SHORTEST, _FLAT_TOL = 30, 1e-4, 1e-3
-_LIMB_STEPS = 300  # where faces begin next to nothing: each makes them a little larger only
+# Where faces begin next to nothing, far out on a limb, each step makes them a little larger only; it
+# takes up to a hundred, elsewhere twenty.
+_FLAT_STEPS, _FLAT_SHORTEST, _FLAT_TOL = 300, 1e-4, 1e-3
 _GRID = 20  # shifts tried along either coordinate
 _SAMPLE = 300  # vertices the rigid fit is judged by
 
@@ -88,7 +89,7 @@ class FlatSurface:
                 turns = np.ascontiguousarray(unfolded_turns(surface, conformal))
             except SolverError as error:
                 _log.info("the %s: %s", name, error)
-            turns = _least_distorted(surface, chart, conformal.lattice, turns, _LIMB_STEPS)
+            turns = _least_distorted(surface, chart, conformal.lattice, turns)
             lost = np.flatnonzero(~(_core.area.turn_areas(chart, turns) > 0.0))
         if len(lost):
             raise SolverError(
@@ -213,14 +214,13 @@ def _least_distorted(
     chart: _core.area.SurfaceChart,
     lattice: NDArray[np.float64],
     turns: NDArray[np.float64],
-    most_steps: int = _FLAT_STEPS,
 ) -> NDArray[np.float64]:
     """Projected Newton steps on ``flat_value``; the start is returned if it is folded."""
     periods = np.ascontiguousarray(lattice.T / math.sqrt(abs(np.linalg.det(lattice))))
     rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
     weights = surface.face_areas / surface.area
     energy = _core.registration.flat_value(chart, turns, periods, rest, weights)
-    for _ in range(most_steps if math.isfinite(energy) else 0):
+    for _ in range(_FLAT_STEPS if math.isfinite(energy) else 0):
         gradient, hessian = _core.registration.flat_model(chart, turns, periods, rest, weights)
         step, alpha = damped_solve(gradient, hessian).reshape(-1, 2), 1.0
         while alpha > _FLAT_SHORTEST:
