@@ -22,8 +22,8 @@ from ..mesh.meshes import TriMesh
 _log = logging.getLogger("stretchmap")
 
 _SEM_STEPS = 10
-# Where faces begin next to nothing, far out on a limb, each step makes them a little larger only; it
-# takes up to a hundred, elsewhere twenty.
+# Where faces begin next to nothing, far out on a limb, each step makes them a little larger only:
+# it takes up to a hundred, elsewhere twenty.
 _FLAT_STEPS, _FLAT_SHORTEST, _FLAT_TOL = 300, 1e-4, 1e-3
 _GRID = 20  # shifts tried along either coordinate
 _SAMPLE = 300  # vertices the rigid fit is judged by
