@@ -5,6 +5,7 @@
 namespace stretchmap::base {
 
 void bind(py::module_& m) {
+  m.def("processors", &processors, py::arg("groups") = "/sys/fs/cgroup");
   m.def("thread_count", &thread_count);
   m.def("set_thread_count", &set_thread_count, py::arg("count"));
   m.def("keep_to_one_thread", &keep_to_one_thread);

@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
 #include <ctime>
 #include <deque>
+#include <fstream>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -44,13 +47,21 @@ std::uint64_t range_of(std::uint64_t begin, std::uint64_t end) { return begin <<
 // Whether this thread is in a shared loop: one inside of it is not shared again.
 thread_local bool sharing = false;
 
-int processors() {
 #ifdef __linux__
-  cpu_set_t allowed;
-  if (sched_getaffinity(0, sizeof allowed, &allowed) == 0) return CPU_COUNT(&allowed);
-#endif
-  return static_cast<int>(std::thread::hardware_concurrency());
+// Processors' worth of time that the process may take, rounded up; as good as infinite if nobody
+// says. Of control groups version 2, else 1.
+int paid_for(const std::string& groups) {
+  double quota = 0.0, period = 0.0;  // 0: none, as for "max" and, of version 1, for -1
+  if (std::ifstream file(groups + "/cpu.max"); file) {
+    file >> quota >> period;
+  } else {
+    std::ifstream(groups + "/cpu/cpu.cfs_quota_us") >> quota;
+    std::ifstream(groups + "/cpu/cpu.cfs_period_us") >> period;
+  }
+  const double count = quota > 0.0 && period > 0.0 ? std::ceil(quota / period) : kMostThreads;
+  return static_cast<int>(std::min<double>(count, kMostThreads));
 }
+#endif
 
 int default_count() {
   const char* asked = std::getenv("OMP_NUM_THREADS");
@@ -229,6 +240,15 @@ struct Employer {
 thread_local Employer employer;
 
 }  // namespace
+
+int processors(const std::string& groups) {
+#ifdef __linux__
+  cpu_set_t allowed;
+  if (sched_getaffinity(0, sizeof allowed, &allowed) == 0)
+    return std::min(CPU_COUNT(&allowed), paid_for(groups));
+#endif
+  return static_cast<int>(std::thread::hardware_concurrency());
+}
 
 int thread_count() { return employer.count; }
 

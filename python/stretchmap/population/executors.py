@@ -18,6 +18,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
+from .. import _core
 from ..base.options import shown, whole
 from ..errors import MissingDependencyError, OptionError, SolverError, StretchmapError
 
@@ -90,8 +91,8 @@ class Processes:
     """
 
     def __init__(self, workers: int | None = None) -> None:
-        count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-        self.workers = (count or 1) if workers is None else whole("workers", workers, 1, 4096)
+        count = max(_core.base.processors(), 1)
+        self.workers = count if workers is None else whole("workers", workers, 1, 4096)
 
     def run(self, task: Task, jobs: Sequence[Any]) -> Iterator[tuple[int, Any]]:
         """As `Executor.run`."""

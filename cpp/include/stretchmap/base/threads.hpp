@@ -6,10 +6,15 @@
 
 #include <atomic>
 #include <cstdint>
+#include <string>
 
 #include "stretchmap/base/types.hpp"
 
 namespace stretchmap {
+
+// Processors that this process may run on: no more than its container pays for.
+// \param groups folder of the control groups, as the system shows them.
+int processors(const std::string& groups = "/sys/fs/cgroup");
 
 // How many threads share the loops of the calling one, itself included: of OMP_NUM_THREADS, else
 // one per processor, unless set_thread_count has been called in this thread.
