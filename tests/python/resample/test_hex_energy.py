@@ -97,6 +97,34 @@ def test_samples_lie_on_both_surfaces():
     assert 0.0 < matched.distance.max() < 0.5
 
 
+@pytest.mark.parametrize("per_side", [2, 3, 5])
+def test_samples_on_edges_and_corners_are_shared(per_side):
+    """All points of all quads, each once; twice matched it is the same."""
+    H, V = a_grid(0.05)
+    quads = boundary_quads(H)
+    surface = samples.torus_surface(16, 12, R=3.0, r=1.0)
+    normals = TORUS.normal(*TORUS.coordinates(surface.V)[:2])
+    one = np.zeros(1, np.int32), np.full((1, 3), 1.0 / 3.0)
+    fit = _core.resample.BoundaryFit(surface.V, surface.F, normals, *one, quads, per_side, 0.1)
+    s, t = (k.ravel()[:, None] for k in np.meshgrid(*2 * [np.linspace(0.0, 1.0, per_side)]))
+    weights = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t])[..., 0]
+    points = np.einsum("ck,qci->qki", weights, V[quads]).reshape(-1, 3)
+    _, first, which = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
+    tree = _core.maps.SurfaceTree(surface.V, surface.F)
+    feet = tree.closest(np.ascontiguousarray(points[first]))[0]
+    expected = np.linalg.norm(feet - points[first], axis=1)
+    across = V[quads[:, 2:]] - V[quads[:, :2]]
+    areas = np.linalg.norm(np.cross(across[:, 0], across[:, 1]), axis=1)
+    shares = np.bincount(which.ravel(), np.repeat(areas / areas.sum() / per_side**2, per_side**2))
+    for _ in range(2):
+        found = fit.match(V)
+        n = found.first_of_surface
+        assert n == len(first)
+        order, wanted = np.argsort(found.distance[:n]), np.argsort(expected)
+        np.testing.assert_allclose(found.distance[:n][order], expected[wanted], atol=1e-9)
+        np.testing.assert_allclose(found.share[:n][order], shares[wanted], rtol=1e-6)
+
+
 def test_gaps_seen_closely_are_those_to_bilinear_quads():
     """Which are what a warped face of a hexahedron is, not triangles between its corners."""
     cube = np.ascontiguousarray(np.indices((2, 2, 2)).reshape(3, -1).T, float)
