@@ -12,6 +12,7 @@ from stretchmap import _core, samples
 from stretchmap.errors import KindError, OptionError
 from stretchmap.mesh.refinement import Refinement
 from stretchmap.mesh.split_edges import SplitSolid
+from stretchmap.registration import map as _map
 from stretchmap.volume import engine, glide_minimize, ground, untangle_order
 from stretchmap.volume.options import FillOptions
 from stretchmap.volume.problem import VolumeProblem
@@ -124,6 +125,31 @@ def test_the_frozen_map_is_kept_where_gliding_crosses(pair, maps, monkeypatch, c
     assert "the boundary is held" in caplog.text
     # By way of a smaller weight, to the same end.
     assert result.distortion.ring_std == pytest.approx(maps["frozen"].distortion.ring_std, rel=0.05)
+
+
+@pytest.mark.parametrize("left", [0.0, 0.6])
+def test_a_glided_map_that_rounding_spoils_has_some_time_for_the_held_one(pair, monkeypatch, left):
+    """What is left of it, and a tenth at least."""
+    marks, given, certified = (pair.source_landmarks, pair.target_landmarks), [], []
+    certify, fill = _map.certify, _map.fill_boundary
+
+    def first_not(*args):
+        certified.append(dataclasses.replace(certify(*args), certified=len(certified) > 0))
+        return certified[-1]
+
+    def filled(*args, glide, budget, **more):
+        given.append((glide, budget))
+        found = fill(*args, glide=glide, budget=budget, **more)
+        budget._end -= budget.left - left * budget.seconds
+        return found
+
+    monkeypatch.setattr(_map, "certify", first_not)
+    monkeypatch.setattr(_map, "fill_boundary", filled)
+    result = sm.register(pair.source, pair.target, marks)
+    assert result.certificate.certified and result.boundary == "frozen"
+    (first, whole), (second, again) = given
+    assert first and not second
+    assert again.seconds == pytest.approx(max(left, 0.1) * whole.seconds, rel=0.05)
 
 
 @pytest.fixture
