@@ -58,6 +58,7 @@ def equalize(
     linear = _core.volume.NewtonOptions(tol=o.cg_tol, max_cg=o.max_cg, keep_hessian=True)
     total = o.target_iter + o.shift_iter
     measured = marginals.measure(x)
+    alike = model.asked_alike(x) if glide else 1.0
     for iteration in range(total):
         if history.budget.spent:
             break
@@ -65,7 +66,7 @@ def equalize(
         if not shifting:
             if marginals.error(measured) < o.marginal_tol:
                 continue
-            newton.set_targets(marginals.targets(measured))
+            newton.set_targets(alike * marginals.targets(measured))
             moved, step = newton.step(x, weights, linear)
             alpha, change = step.alpha, step.decrement
         else:

@@ -50,6 +50,7 @@ _FAIR = 5e-3
 # is gained from there on is paid with shapes and with most of the steps.
 _RIGHT = 1e-4
 _ROUNDING = 1e-14  # of an energy that is 0 where nothing is distorted
+_DRIFT = 2e-3  # of the logarithm of what all tets alike are asked for, before it is set anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +107,12 @@ class _Asked:
 
     Asked for those at once, what a held boundary has squeezed into a hundredth of its volume
     presses so hard that single elements cut all steps short.
+
+    Even ones are those of `SolidModel.asked_alike`.
     """
 
     def __init__(self, model: SolidModel, first: NDArray[np.float64] | None) -> None:
-        self._model, self._logs = model, np.zeros(0)
+        self._model, self._logs, self._alike = model, np.zeros(0), 1.0
         self.even, self.volumes = True, np.ones(len(model.T))
         if first is not None:
             self._take(np.log(first), first)
@@ -121,6 +124,14 @@ class _Asked:
         logs = self._logs * (_LEANER if alpha >= 1.0 else math.sqrt(_LEANER))
         volumes = np.exp(logs)
         self._take(logs, volumes / (self._model.shares * volumes).sum(), stuck=alpha == 0.0)
+
+    def follow_boundary(self, x: NDArray[np.float64]) -> bool:
+        """Whether ``x`` asks for other even ones."""
+        alike = self._model.asked_alike(x)
+        if abs(math.log(alike / self._alike)) <= _DRIFT:
+            return False
+        self._alike, self.volumes = alike, np.full(len(self._model.T), alike)
+        return True
 
     def _take(
         self, logs: NDArray[np.float64], volumes: NDArray[np.float64], *, stuck: bool = False
@@ -243,6 +254,9 @@ def minimize(
             keep_hessian=sharing.kept > 0,
             negative=_NEGATIVE if weight >= o.volume_weight and not sharing.convex else 0.0,
         )
+        if glide and volumes.even and weight >= goal and volumes.follow_boundary(x):
+            goals = volumes.volumes
+            newton.set_targets(goals)
         if free != (1.0, 1.0):
             ratios = _core.mesh.tet_volumes(x, model.T) / _core.mesh.tet_volumes(model.V, model.T)
             wanted = volumes.volumes if glide else model.targets

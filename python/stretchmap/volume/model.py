@@ -22,6 +22,10 @@ __all__ = ["History", "SolidModel", "face_areas"]
 
 FREE, FIXED, GLIDING = 0, 1, 2
 _THICK = 0.02  # share of the mean volume round its vertices that a sliver is given
+# Weight of volume that is lost as a whole, where boundary faces cut off what is curved: with all of
+# it, tets press outward against faces that cannot give way, and single ones pay for what all are
+# missing; with none, hardly anything keeps faces from growing.
+_AS_A_WHOLE = 0.1
 _REACH = 8.0  # factor up to which the volume next to a boundary face may be off what it expects
 
 
@@ -164,6 +168,14 @@ class SolidModel:
         missing = self.ground.volume - enclosed
         asked = enclosed + missing * yielding / self._mean(yielding)
         return np.asarray(np.maximum(asked, 0.5 * enclosed))
+
+    def asked_alike(self, x: NDArray[np.float64]) -> float:
+        """Volume to ask of every tet whose boundary glides on a torus, relative to its share.
+
+        That of the start, less most of what the boundary has cut off since.
+        """
+        enclosed = float(_core.mesh.tet_volumes(x, self.T).sum())
+        return math.pow(enclosed, 1.0 - _AS_A_WHOLE)
 
     def ring_ratios(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Ratios (6.5) round the vertices: (n,)."""

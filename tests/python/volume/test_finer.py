@@ -53,17 +53,23 @@ def mean_error(result: sm.VolumeMap) -> float:
     return float(np.abs(result.distortion.ratios - 1.0).mean())
 
 
-def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch, not_coarse):
-    """The input's tets gain by a third or next to nothing, together a fifth; all tets of short
-    plates a fifth, of long ones as often nothing, there being more small ones.
+def chain(n: int) -> sm.TetMesh:
+    """Blocks of 27 cells, the first with a hole, each behind a neck of one cell."""
+    cells = np.zeros((4 * n + 3, 3, 3), bool)
+    for k in range(n + 1):
+        cells[4 * k : 4 * k + 3] = cells[4 * k + 3 : 4 * k + 4, 1, 1] = True
+    cells[1, 1] = False
+    return sm.TetMesh(*cut_cells(cells), orient=True)
 
-    How many tets are added is up to rounding, and what is gained goes with it: the plates are
+
+def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch, not_coarse):
+    """The input's tets gain by a third, all tets by a tenth, there being more small ones.
+
+    How many tets are added is up to rounding, and what is gained goes with it: the chains are
     mapped with solves of two exactnesses.
     """
-    short = [(8, 3, 3), (9, 5, 3), (8, 4, 4)]
-    long = [(15, 3, 3), (17, 3, 3), (8, 4, 3)]
-    solids = [plate(*shape) for shape in short + long] * 2
-    exact = [sm.VolumeOptions(cg_tol=tol) for tol in (0.05, 0.001) for _ in short + long]
+    solids = [chain(n) for n in (1, 2, 3)] * 2
+    exact = [sm.VolumeOptions(cg_tol=tol) for tol in (0.05, 0.001) for _ in range(3)]
 
     def maps() -> list[sm.VolumeMap]:
         return [sm.volume_map(s, options=o) for s, o in zip(solids, exact, strict=True)]
@@ -71,21 +77,17 @@ def test_tets_that_keep_volumes_badly_get_vertices(monkeypatch, not_coarse):
     finer = maps()
     monkeypatch.setattr(engine, "_FINER_ROUNDS", 0)
     coarse = maps()
-    errors = []
-    for k, (solid, before, after) in enumerate(zip(solids, coarse, finer, strict=True)):
+    for solid, before, after in zip(solids, coarse, finer, strict=True):
         assert not before.refinement.halved and after.refinement.halved
         assert before.converged and after.converged and after.certificate.certified
-        assert unevenness(after, solid) < unevenness(before, solid)
-        assert mean_error(before) > engine._UNEVEN
+        assert unevenness(after, solid) < 0.8 * unevenness(before, solid)
+        assert mean_error(after) < mean_error(before) > engine._UNEVEN
         np.testing.assert_array_equal(after.mesh.V[: solid.n_vertices], solid.V)
         np.testing.assert_array_equal(after.mesh.boundary_vertices, solid.boundary_vertices)
-        if k % len(short + long) < len(short):
-            errors.append((mean_error(after), mean_error(before)))
-    assert all(after < before for after, before in errors)
-    assert sum(after for after, _ in errors) < 0.9 * sum(before for _, before in errors)
-    assert sum(map(unevenness, finer, solids)) < 0.85 * sum(map(unevenness, coarse, solids))
+    assert sum(map(mean_error, finer)) < 0.9 * sum(map(mean_error, coarse))
+    assert sum(map(unevenness, finer, solids)) < 0.7 * sum(map(unevenness, coarse, solids))
     n_finer, n_coarse = (sum(each.mesh.n_tets for each in made) for made in (finer, coarse))
-    assert n_finer < 1.25 * n_coarse
+    assert n_finer < 1.7 * n_coarse
 
 
 def drilled(half: float) -> sm.TetMesh:
@@ -100,7 +102,7 @@ def drilled(half: float) -> sm.TetMesh:
 def test_coarse_solids_get_as_many_vertices_as_it_takes(monkeypatch):
     """All tets about a small hole are small; what is large is too few to have any far above the
     mean."""
-    solids = [drilled(half) for half in (0.1, 0.08, 0.05, 0.02, 0.01)]
+    solids = [drilled(half) for half in (0.08, 0.05, 0.02, 0.01, 0.007)]
     maps = [sm.volume_map(each) for each in solids]
     assert all(each.certificate.certified and each.converged for each in maps)
     assert max(map(mean_error, maps)) < 0.075
@@ -123,13 +125,13 @@ def test_solids_that_are_not_coarse_get_more_where_volumes_are_kept_worse(monkey
 
 
 def test_rounds_go_on_while_volumes_are_kept_badly(monkeypatch, not_coarse):
-    solids = [plate(*shape) for shape in ((8, 3, 3), (9, 5, 3))]
+    solids = [chain(n) for n in (2, 3)]
     all_rounds = [sm.volume_map(each) for each in solids]
-    monkeypatch.setattr(engine, "_FINER_ROUNDS", 2)
-    two_rounds = [sm.volume_map(each) for each in solids]
+    monkeypatch.setattr(engine, "_FINER_ROUNDS", 1)
+    one_round = [sm.volume_map(each) for each in solids]
     assert all(result.converged for result in all_rounds)
-    left, before = (sum(map(unevenness, made, solids)) for made in (all_rounds, two_rounds))
-    assert left < 0.93 * before
+    left, before = (sum(map(unevenness, made, solids)) for made in (all_rounds, one_round))
+    assert left < 0.9 * before
 
 
 def test_vertices_come_once_steps_gain_little(monkeypatch, not_coarse):

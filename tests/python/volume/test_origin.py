@@ -33,11 +33,12 @@ def test_a_moved_and_renumbered_body_has_the_same_coordinates(found):
     assert (apart(one[order, :2], other[:, :2]) < 5.0).all()
 
 
-def test_other_maps_of_the_same_body_begin_at_the_same_place():
+@pytest.mark.parametrize(("seed", "growths"), [(34, (1.4, 1.7, 3.0)), (35, (1.2, 1.7))])
+def test_other_maps_of_the_same_body_begin_at_the_same_place(seed, growths):
     """Terms of opposite signs that are nearly as large do not decide by turns which way to run."""
-    found = sm.volume_map(sm.samples.vertebra_population(1, seed=34, n_tets=3000).solids[0])
+    found = sm.volume_map(sm.samples.vertebra_population(1, seed=seed, n_tets=3000).solids[0])
     here = sm.origin_of(found).coordinates(found.coordinates())
-    for growth in (1.2, 1.4, 1.7, 3.0):
+    for growth in growths:
         other = sm.volume_map(found.mesh, options=sm.VolumeOptions(growth=growth))
         there = sm.origin_of(other).coordinates(other.coordinates(found.mesh.V))
         assert (apart(here[:, :2], there[:, :2]) < 5.0).all()
