@@ -41,7 +41,7 @@ _log = logging.getLogger("stretchmap")
 _UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, 3.0
 # More tets get vertices where those do not lead to such a mean, as long as there are no more tets
 # than go with it: a coarse solid gets them cheaply.
-_MORE, _BADLY = (1.0, 0.3), ((5_000, 0.06), (40_000, 0.08))
+_MORE, _BADLY = (1.0, 0.3), ((5_000, 0.06), (200_000, 0.08))
 _FINER = 0.7  # share of the time left that this may take
 _GAINED = 0.99  # of how uneven volumes were, at most: else the vertices are taken back
 
