@@ -42,6 +42,7 @@ _UNEVEN, _FINER_ROUNDS, _POOR = 0.05, 8, 3.0
 # More tets get vertices where those do not lead to such a mean, as long as there are no more tets
 # than go with it: a coarse solid gets them cheaply.
 _MORE, _BADLY = (1.0, 0.3), ((5_000, 0.06), (200_000, 0.08))
+_FAR_TOO_UNEVEN = 0.1  # such a mean calls for these at once: the few worst would take many rounds
 _FINER = 0.7  # share of the time left that this may take
 _GAINED = 0.99  # of how uneven volumes were, at most: else the vertices are taken back
 
@@ -188,7 +189,9 @@ def _finer(run: Run, done: Minimized) -> Minimized:
     """
     o, history = run.options, run.history
     whole, history.budget = history.budget, history.budget.share(_FINER)
-    for poor in (_POOR, *_MORE):
+    run.x = done.x
+    at_once = _is_bad(run.problem, 0) and _mean_error(run.problem, run.x) > _FAR_TOO_UNEVEN
+    for poor in _MORE if at_once else (_POOR, *_MORE):
         for _ in range(_FINER_ROUNDS):
             run.x = done.x
             before, edges = run.problem, _uneven_edges(run.problem, poor)

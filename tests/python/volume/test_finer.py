@@ -288,3 +288,17 @@ def test_the_longest_edges_that_reach_inside(solid):
     assert set(np.round(lengths, 12)) == set(np.round(list(wanted), 12))
     assert len(np.unique(found, axis=0)) == len(found)
     assert longest_inner_edges(whole, whole.V, tets[:0]).shape == (0, 2)
+
+
+def test_where_volumes_are_kept_far_too_badly_more_get_vertices_at_once(monkeypatch):
+    """How many steps that saves is up to rounding: solves of two exactnesses."""
+    exact = [sm.VolumeOptions(cg_tol=tol) for tol in (0.1, 0.01)]
+
+    def maps() -> list[sm.VolumeMap]:
+        return [sm.volume_map(chain(4), options=o) for o in exact]
+
+    at_once = maps()
+    monkeypatch.setattr(engine, "_FAR_TOO_UNEVEN", np.inf)
+    steps, before = (sum(len(each.history) for each in made) for made in (at_once, maps()))
+    assert steps < 0.92 * before
+    assert all(each.converged and mean_error(each) < 0.08 for each in at_once)
