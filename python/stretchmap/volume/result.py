@@ -80,8 +80,13 @@ class VolumeMap(MapResult):
     certificate: Certificate
     vertex_exact: bool = False
 
+    @property
+    def filled(self) -> float:
+        """Share of the torus' volume that the image fills; flat boundary faces cut off the rest."""
+        return self.distortion.image_total / self.torus.volume
+
     def extra_scalars(self) -> dict[str, Any]:
-        """Method, boundary and what was added to the input mesh."""
+        """Method, boundary, what the image fills and what was added to the input mesh."""
         added = self.refinement
         certificate = self.certificate
         return {
@@ -90,6 +95,7 @@ class VolumeMap(MapResult):
             "method": self.method,
             "boundary": self.boundary,
             "vertex_exact": self.vertex_exact,
+            "filled": self.filled,
             "added_vertices": 0 if added is None else added.n_split,
             "added_tets": 0 if added is None else added.n_added_tets,
         }

@@ -473,3 +473,14 @@ def test_of_very_many_flipped_tets_a_knotted_hole_may_be_the_reason(monkeypatch)
     with pytest.raises(CertificationError) as caught:
         require_certified(crossed, "the map")
     assert str(caught.value).startswith("the map is not certified: 2 faces cross; keep_best=True")
+
+
+def test_flat_faces_fill_the_torus_the_more_the_finer_they_are():
+    filled = []
+    for n_tets in (600, 20_000):
+        found = sm.volume_map(sm.samples.solid_torus(n_tets))
+        enclosed = found.mesh.tet_volumes.sum()  # the image has the volume of the source
+        assert found.filled == pytest.approx(enclosed / found.torus.volume)
+        assert found.to_dict()["filled"] == found.filled
+        filled.append(found.filled)
+    assert 0.7 < filled[0] < 0.9 and 0.97 < filled[1] < 1.0
