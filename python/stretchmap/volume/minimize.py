@@ -112,7 +112,7 @@ class _Asked:
     """
 
     def __init__(self, model: SolidModel, first: NDArray[np.float64] | None) -> None:
-        self._model, self._logs, self._alike = model, np.zeros(0), 1.0
+        self._model, self._logs = model, np.zeros(0)
         self.even, self.volumes = True, np.ones(len(model.T))
         if first is not None:
             self._take(np.log(first), first)
@@ -128,9 +128,9 @@ class _Asked:
     def follow_boundary(self, x: NDArray[np.float64]) -> bool:
         """Whether ``x`` asks for other even ones."""
         alike = self._model.asked_alike(x)
-        if abs(math.log(alike / self._alike)) <= _DRIFT:
+        if abs(math.log(alike / self.volumes[0])) <= _DRIFT:  # even ones are all the same
             return False
-        self._alike, self.volumes = alike, np.full(len(self._model.T), alike)
+        self.volumes = np.full(len(self._model.T), alike)
         return True
 
     def _take(
