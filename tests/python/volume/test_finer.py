@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -302,3 +303,14 @@ def test_where_volumes_are_kept_far_too_badly_more_get_vertices_at_once(monkeypa
     steps, before = (sum(len(each.history) for each in made) for made in (at_once, maps()))
     assert steps < 0.92 * before
     assert all(each.converged and mean_error(each) < 0.08 for each in at_once)
+
+
+@pytest.mark.parametrize(
+    ("n_tets", "error", "bad"),
+    [(4_990, 0.07, True), (5_000, 0.07, False), (5_000, 0.09, True), (199_990, 0.09, True),
+     (200_000, 0.09, False), (199_990, 0.07, False)],
+)  # fmt: skip
+def test_what_is_bad_goes_with_the_number_of_tets(monkeypatch, n_tets, error, bad):
+    monkeypatch.setattr(engine, "_mean_error", lambda *_: error)
+    problem = SimpleNamespace(solid=SimpleNamespace(n_tets=n_tets), x=None)
+    assert engine._is_bad(problem, 6) == bad
