@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import stretchmap as sm
-from stretchmap.population.fitting import Anchors
+from stretchmap.deformation.fitting import Anchors
 
 Array = NDArray[np.float64]
 TIP = 0.02  # of the size: how far round the farthest vertex a tip reaches

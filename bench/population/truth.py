@@ -14,8 +14,8 @@ import numpy as np
 
 import stretchmap as sm
 from stretchmap import _core
-from stretchmap.population.fitting import Anchors
-from stretchmap.population.pose import rigid_poses
+from stretchmap.deformation.fitting import Anchors
+from stretchmap.deformation.pose import rigid_poses
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "python"))
 from population.truth import correspondence_errors, mode_angles, size

@@ -1,10 +1,11 @@
 """Populations: solids brought into correspondence, their mean, modes, and statistics of fields."""
 
+from ..deformation.similarity import Similarity
 from .correspondence import Correspondence, correspond
 from .executors import Dask, Processes, Serial
 from .fields import FieldStatistics, carry_field, field_statistics
 from .measures import ModelMeasures, measure_model
-from .procrustes import Procrustes, Similarity, generalized_procrustes
+from .procrustes import Procrustes, generalized_procrustes
 from .result import Population
 from .run import fit
 from .shape_model import ShapeModel, shape_model

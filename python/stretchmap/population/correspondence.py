@@ -13,6 +13,8 @@ from .. import _core
 from ..base.arrays import as_reals
 from ..base.options import one_of, real
 from ..certificate.findings import Certificate
+from ..deformation.fitting import Template
+from ..deformation.smooth import settled, smooth_deformation
 from ..errors import MeshError, OptionError, SolverError
 from ..maps.result import MapResult
 from ..mesh.given import as_solid
@@ -21,18 +23,12 @@ from ..registration.map import register
 from ..registration.result import Registration
 from ..volume.fill import FillMap, fill
 from ..volume.options import FillOptions
-from .fitting import Fit, Template, fit_surface
-from .pose import rigid_poses, same_pose
-from .procrustes import Similarity, similarity_onto
 
 __all__ = ["Correspondence", "correspond"]
 
 Along = Literal["smooth", "area"]
 
-_SMOOTHINGS = 20  # rounds in which vertices round faces that cross go to the middle of their rings
-_MOST_PAIRS = 10_000
 _FILLS, _EASINGS = 4, 3  # tries to fill a boundary, and how often it is evened out before the next
-_NEARLY = 2.0  # energy of a stiff fit over the least, of poses that are looked at further
 
 Array = NDArray[np.float64]
 
@@ -159,7 +155,7 @@ def correspond(
         if given.anchors is None:
             raise OptionError(
                 "landmarks: the template has none; pass Template(solid, Anchors.of(solid.surface, "
-                "points)) of stretchmap.population.fitting"
+                "points)) of stretchmap.deformation"
             )
         landmarks = as_reals(landmarks, "landmarks", (len(given.anchors.faces), 3))
     one_of("along", along, ("smooth", "area"))
@@ -210,16 +206,10 @@ def _smooth(
     volume_weight: float,
 ) -> tuple[FillMap | None, Array, float, str]:
     """The smooth map, or why there is none; the deformation, its distance from the surface."""
-    starts = _starts(template, solid, start, landmarks)
-    if len(starts) > 1:
-        coarse = [_fitted(template, solid, *s, landmarks, True).energy for s in starts]
-        starts = [s for s, e in zip(starts, coarse, strict=True) if e <= _NEARLY * min(coarse)]
-    fits = [_fitted(template, solid, *s, landmarks) for s in starts]
-    best = min(range(len(fits)), key=lambda i: fits[i].energy)
-    pose, fitted = starts[best][0], fits[best]
+    pose, fitted = smooth_deformation(template, solid, start, landmarks)
     distance = fitted.distance / template.spline.length
     goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)
-    points, moved = _settled(template, goal, fitted.projected), pose(fitted.points)
+    points, moved = settled(template, goal, fitted.projected), pose(fitted.points)
     options = FillOptions(volume_weight=volume_weight)
     try:
         for _ in range(_FILLS):
@@ -231,26 +221,6 @@ def _smooth(
     except (MeshError, SolverError) as error:
         reason = str(error)
     return None, moved, distance, f"smooth correspondence given up: {reason}"
-
-
-def _starts(
-    template: Template, solid: TetMesh, start: Array | None, landmarks: Array | None
-) -> list[tuple[Similarity, Array | None]]:
-    """Poses of the template on the solid, with where its boundary vertices go about, if known.
-
-    A start without landmarks is doubted: it may come from a template so unlike the solid that
-    another pose needed less bending, which from an average does not.
-    """
-    surface = template.solid.surface
-    if start is not None:
-        pose = similarity_onto(surface.V, start)
-        if landmarks is not None:
-            return [(pose, start)]
-        others = rigid_poses(surface, solid.surface)
-        return [(pose, start), *((p, None) for p in others if not same_pose(p, pose))]
-    if landmarks is not None and template.anchors is not None and len(landmarks) >= 3:
-        return [(similarity_onto(template.anchors.at(surface.V, surface.F), landmarks), None)]
-    return [(pose, None) for pose in rigid_poses(surface, solid.surface)]
 
 
 def _eased(template: Template, goal: TriMesh, points: Array, found: FillMap) -> Array:
@@ -267,35 +237,3 @@ def _eased(template: Template, goal: TriMesh, points: Array, found: FillMap) -> 
     for _ in range(_EASINGS):
         eased[moving] = tree.closest((template.ring_mean @ eased)[moving])[0]
     return eased
-
-
-def _fitted(
-    template: Template,
-    solid: TetMesh,
-    pose: Similarity,
-    start: Array | None,
-    landmarks: Array | None,
-    coarse: bool = False,
-) -> Fit:
-    """The fit in the pose of the template."""
-    goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)
-    begin = template.solid.surface.V if start is None else pose.back(start)
-    held = None if landmarks is None else pose.back(landmarks)
-    return fit_surface(template, goal, begin, held, coarse=coarse)
-
-
-def _settled(template: Template, goal: TriMesh, points: Array) -> Array:
-    """Points of the goal, moved along it where faces of the template cross.
-
-    Closest points of neighbors may change their order where the goal is sharper than the spline.
-    """
-    F = template.solid.surface.F
-    tree = _core.maps.SurfaceTree(goal.V, goal.F)
-    settled = np.array(points)
-    for _ in range(_SMOOTHINGS):
-        crossing = _core.certificate.crossing_faces(settled, F, _MOST_PAIRS)
-        if not len(crossing):
-            break
-        moving = np.unique(F[np.unique(crossing)])
-        settled[moving] = tree.closest((template.ring_mean @ settled)[moving])[0]
-    return settled

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate
+from ..deformation.similarity import similarity_onto
 from ..mesh.meshes import TetMesh
 from ..volume.fill import fill
 from ..volume.options import FillOptions
-from .procrustes import similarity_onto
 
 __all__ = ["certified_mean", "movement"]
 

@@ -19,6 +19,7 @@ from ..base.arrays import read_only
 from ..base.files import atomic_path
 from ..base.options import as_path, callback, flag, one_of, real, shown, whole
 from ..base.progress import Progress, report
+from ..deformation.fitting import Anchors
 from ..errors import LandmarkError, OptionError, SolverError, StretchmapError
 from ..io.npz import save_npz
 from ..mesh.given import as_solid
@@ -26,7 +27,6 @@ from ..mesh.meshes import TetMesh
 from ..mesh.refinement import refine_overconstrained
 from .correspondence import Along
 from .executors import Executor, as_executor
-from .fitting import Anchors
 from .mean import certified_mean, movement
 from .procrustes import generalized_procrustes
 from .result import Population

@@ -23,12 +23,12 @@ from .._version import __version__
 from ..base.files import atomic_path
 from ..base.tables import plain_dict
 from ..base.threads import threads
+from ..deformation.fitting import Anchors, Template
+from ..deformation.pose import looks_mirrored
 from ..errors import LandmarkError, MissingDependencyError, StretchmapError
 from ..io.reading import read_solid
 from ..registration.mirror import MIRROR_ADVICE, mirrored_landmarks
 from .correspondence import Along, correspond
-from .fitting import Anchors, Template
-from .pose import looks_mirrored
 from .shapes import Shape
 
 __all__ = ["Job", "Record", "failed", "map_file", "run_job"]

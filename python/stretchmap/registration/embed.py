@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..mesh.meshes import TriMesh
 from ..mesh.split_edges import SplitSolid
 from .flat_torus import FlatSurface
 from .overlay import Splits, overlay_splits
@@ -139,7 +140,7 @@ def embed_boundary(
     held : ndarray of int32
         Boundary vertices that stay where they are: landmarks.
     """
-    crossings = _core.certificate.crossing_faces(points, source.solid.surface.F, _MOST_PAIRS)
+    crossings = crossing_faces(points, source.solid.surface)
     start = EmbeddedBoundary(source, points, crossings)
     for way in (_follow, _overlay):
         if not len(crossings):
@@ -148,6 +149,11 @@ def embed_boundary(
         if not len(result.crossings):
             return result
     return start
+
+
+def crossing_faces(points: NDArray[np.float64], surface: TriMesh) -> NDArray[np.int32]:
+    """Pairs (c, 2) of faces that cross where vertices go to ``points``; of very many only some."""
+    return np.asarray(_core.certificate.crossing_faces(points, surface.F, _MOST_PAIRS))
 
 
 def _follow(
@@ -166,7 +172,7 @@ def _follow(
         n_new = len(image.turns) - len(points)
         points = np.concatenate([points, target.points(image.turns[-n_new:])])
         image, points = _settled(image, target, points, held, n_new)
-        crossings = _core.certificate.crossing_faces(points, image.surface.F, _MOST_PAIRS)
+        crossings = crossing_faces(points, image.surface)
         since = 0 if len(crossings) < fewest else since + 1
         fewest = min(fewest, len(crossings))
     return EmbeddedBoundary(split, points, crossings)
@@ -191,7 +197,7 @@ def _overlay(
             break
         split, image = _split(split, image, bad)
         points = np.concatenate([points, target.points(image.turns[len(points) :])])
-        crossings = _core.certificate.crossing_faces(points, image.surface.F, _MOST_PAIRS)
+        crossings = crossing_faces(points, image.surface)
     return EmbeddedBoundary(split, points, crossings)
 
 

@@ -17,6 +17,7 @@ from ..mesh.meshes import TetMesh
 from ..volume.engine import solve
 from ..volume.options import FillOptions
 from ..volume.problem import Outcome, VolumeProblem
+from .boundary import BoundaryWays, Laid
 from .composed import composed
 from .embed import EmbeddedBoundary
 from .flat_torus import Gauge
@@ -102,42 +103,47 @@ def fill_boundary(
 def fill_either_way(
     source: TetMesh,
     target: TetMesh,
-    boundary: EmbeddedBoundary,
-    gauge: Gauge,
+    laid: Laid,
+    ways: BoundaryWays,
     options: FillOptions,
     budget: Budget,
     progress: Progress | None,
 ) -> Filled | None:
-    """`fill_boundary` without landmarks, gliding; what a part of the time does not do is tried from
-    the volume maps of both solids, and the better map counts.
+    """`fill_boundary` without landmarks, gliding; what a part of the time does not do is tried with
+    the boundary laid in other ways, then from the volume maps of both solids, and the best map
+    counts.
 
     None if the boundary crosses itself and there is no such map.
 
     Parameters
     ----------
     source, target : TetMesh
-    boundary : EmbeddedBoundary
-        Of the source, on the target's surface.
-    gauge : Gauge
+    laid : Laid
+        The source's boundary on the target's.
+    ways : BoundaryWays
     options : FillOptions
     budget : Budget
     progress : Progress or None
     """
-    best, trial = None, _Trial(budget, progress)
-    if not len(boundary.crossings):
-        best = fill_boundary(
-            boundary, gauge, target, options,
-            pinned=np.zeros(0, np.int32), glide=True, budget=trial, progress=trial.note,
-        )  # fmt: skip
-        if best.outcome.converged or budget.left < _WORTH * budget.seconds:
-            return best
+    best: Filled | None = None
+    waiting = [laid]
+    while waiting:
+        way = min(waiting, key=lambda way: way.rank)
+        if not way.crosses:
+            trial = _Trial(budget, progress)
+            found = fill_boundary(
+                way.embedded, way.gauge, target, options,
+                pinned=np.zeros(0, np.int32), glide=True, budget=trial, progress=trial.note,
+            )  # fmt: skip
+            best = _better(best, found, target)
+            if best.outcome.converged or budget.left < _WORTH * budget.seconds:
+                return best
+        waiting = ways.others(budget)
     _log.info("once more, by way of the solid torus")
     begin = composed(source, target, options, budget.share(_MAPS), progress)
     if begin is not None:
         outcome = solve(begin.problem, options, glide=True, budget=budget, progress=progress)
-        other = Filled(begin.boundary, begin.gauge, outcome)
-        if best is None or other.rank(target.volume) < best.rank(target.volume):
-            best = other
+        best = _better(best, Filled(begin.boundary, begin.gauge, outcome), target)
     if best is None or best.outcome.converged or budget.left < _WORTH * budget.seconds:
         return best
     outcome = solve(
@@ -146,3 +152,9 @@ def fill_either_way(
     history = best.outcome.history + outcome.history
     more = dataclasses.replace(best, outcome=dataclasses.replace(outcome, history=history))
     return more if more.rank(target.volume) <= best.rank(target.volume) else best
+
+
+def _better(one: Filled | None, other: Filled, target: TetMesh) -> Filled:
+    if one is None or other.rank(target.volume) < one.rank(target.volume):
+        return other
+    return one

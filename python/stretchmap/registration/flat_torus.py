@@ -272,7 +272,7 @@ class Gauge:
     residual : float
         Root mean square misfit the gauge was chosen by, as a share of the target's diagonal.
     rule : str
-        ``"landmarks"`` or ``"rigid fit"``.
+        ``"landmarks"``, ``"rigid fit"`` or ``"smooth fit"``: of a smooth deformation in space.
     """
 
     sign: int
@@ -288,22 +288,24 @@ class Gauge:
 
 
 def choose_gauge(
-    source: FlatSurface, target: FlatSurface, landmarks: NDArray[np.int32] | None
+    source: FlatSurface,
+    target: FlatSurface,
+    belong: tuple[NDArray[np.integer], NDArray[np.float64]] | None,
+    rule: str = "landmarks",
 ) -> Gauge:
     """Gauge with the least misfit.
 
-    With three or more landmarks, surface vertex ids (k, 2), the misfit is the distance of their
-    images from where they belong. Without, it is what remains between vertices and their images
-    after the best similarity (rotation without reflection, translation, scale): two bones of one
-    kind fit well in the right gauge only.
+    With vertex ids (k,) of the source and points (k, 3) near the target where they ``belong``, the
+    misfit is how far from there they come to lie. Without, it is what remains between vertices and
+    their images after the best similarity (rotation without reflection, translation, scale): two
+    bones of one kind fit well in the right gauge only.
     """
-    use_landmarks = landmarks is not None and len(landmarks) >= 3
-    if use_landmarks:
-        assert landmarks is not None
-        ids, goals = landmarks[:, 0], target.surface.V[landmarks[:, 1]]
+    if belong is not None:
+        ids, goals = belong
     else:
         step = max(1, source.surface.n_vertices // _SAMPLE)
         ids, goals = np.arange(0, source.surface.n_vertices, step, dtype=np.int32), None
+        rule = "rigid fit"
     size = float(np.linalg.norm(np.ptp(target.surface.V, axis=0)))
     grid = np.stack(np.meshgrid(*[np.arange(_GRID) / _GRID] * 2, indexing="ij"), -1).reshape(-1, 2)
 
@@ -330,7 +332,6 @@ def choose_gauge(
         values = misfits(sign, twist, shift + width * offsets)
         i = int(np.argmin(values))
         value, shift = float(values[i]), shift + width * offsets[i]
-    rule = "landmarks" if use_landmarks else "rigid fit"
     return Gauge(sign, twist, (float(shift[0]), float(shift[1])), value / size, rule)
 
 

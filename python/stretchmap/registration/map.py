@@ -22,25 +22,15 @@ from ..base.progress import Progress
 from ..base.threads import takes_threads
 from ..certificate.checks import certify
 from ..certificate.findings import Certificate, require_certified
-from ..errors import ArrayError, CertificationError, LandmarkError, SolverError
+from ..errors import ArrayError, CertificationError, LandmarkError
 from ..maps.history import IterationRecord
 from ..mesh.given import as_solid
 from ..mesh.meshes import TetMesh
 from ..mesh.refinement import Refinement
-from ..mesh.split_edges import SplitSolid
 from ..volume.options import FillOptions, check_prescribed
-from .affine import affine_landmark_map
-from .embed import (
-    EmbeddedBoundary,
-    embed_boundary,
-    halve_edges_once,
-    split_long_edges,
-    unfold_boundary,
-)
+from .boundary import BoundaryWays
 from .filling import Filled, fill_boundary, fill_either_way
-from .flat_torus import FlatSurface, Gauge, choose_gauge
 from .landmarks import Landmarks, read_landmarks
-from .match import Match, match_surfaces
 from .mirror import mirrored_landmarks
 from .result import LandmarkMap, Registration
 
@@ -163,15 +153,17 @@ def register(
     if mirrored:
         _log.warning("%s", mirrored)
     try:
-        embedded, gauge, history = _boundary_map(
-            source, target, marks, landmark_map, max_iter, tol, progress
+        ways = BoundaryWays(
+            source, target, marks, landmark_map, max_iter=max_iter, tol=tol, progress=progress
         )
+        laid = ways.lay(budget)
     except LandmarkError as error:
         raise LandmarkError(f"{error}; {mirrored}" if mirrored else str(error), error.ids) from None
+    embedded, gauge = laid.embedded, laid.gauge
     seconds["boundary"] = time.perf_counter() - clock
     clock, filled = time.perf_counter(), None
     if boundary == "glide" and not len(marks):
-        filled = fill_either_way(source, target, embedded, gauge, options, budget, progress)
+        filled = fill_either_way(source, target, laid, ways, options, budget, progress)
     if filled is None:
         if len(embedded.crossings) and not keep_best:
             raise CertificationError(
@@ -196,7 +188,7 @@ def register(
     seconds["volume"] = time.perf_counter() - clock
     if not keep_best:
         require_certified(certificate, "the registration")
-    return _result(filled, certificate, target, marks, landmark_map, history, seconds)
+    return _result(filled, certificate, target, marks, landmark_map, laid.history, seconds)
 
 
 def _landmarks(given: Any, source: TetMesh, target: TetMesh) -> Landmarks:
@@ -212,56 +204,6 @@ def _landmarks(given: Any, source: TetMesh, target: TetMesh) -> Landmarks:
     if not (isinstance(given, (tuple, list)) and len(given) == 2):
         raise ArrayError("landmarks must be a pair (source, target), a file or a Landmarks object")
     return Landmarks.of(source, target, *given)
-
-
-def _boundary_map(
-    source: TetMesh,
-    target: TetMesh,
-    marks: Landmarks,
-    landmark_map: LandmarkMap,
-    max_iter: int,
-    tol: float,
-    progress: Progress | None,
-) -> tuple[EmbeddedBoundary, Gauge, tuple[IterationRecord, ...]]:
-    """Points of the target surface for the boundary vertices of the source, refined if need be."""
-    first, second = (
-        FlatSurface.of(solid.surface, name)
-        for solid, name in ((source, "source"), (target, "target"))
-    )
-    pairs = np.stack(
-        [source.boundary_index[marks.source], target.boundary_index[marks.target]], axis=1
-    )
-    second = split_long_edges(SplitSolid.of(target), second)[1]
-    gauge = choose_gauge(first, second, pairs)
-    split, first = split_long_edges(SplitSolid.of(source), first.changed(gauge))
-    held = pairs if landmark_map == "smooth" else pairs[:0]
-
-    def matched() -> Match:
-        return match_surfaces(
-            first, second, first.turns, held, max_iter=max_iter, tol=tol, progress=progress
-        )
-
-    try:
-        match = matched()
-    except LandmarkError as error:
-        _log.info("%s: once more with edges of the boundary halved", error)
-        split, first = halve_edges_once(split, first)
-        match = matched()
-    image, points = first.at(match.y), match.points
-    if landmark_map == "affine":
-        starts, ends = image.turns[pairs[:, 0]], second.turns[pairs[:, 1]]
-        split, image, folded = unfold_boundary(
-            split, image, lambda at: affine_landmark_map(starts, ends, at)
-        )
-        if len(folded):
-            raise SolverError(
-                f"the source mesh is too coarse for the affine map: {len(folded)} faces turn over, "
-                "and refining them does not help; use landmark_map='smooth'",
-                folded,
-            )
-        points = second.points(image.turns)
-    points[pairs[:, 0]] = second.surface.V[pairs[:, 1]]
-    return embed_boundary(split, second, image, points, pairs[:, 0]), gauge, match.history
 
 
 def _image(filled: Filled) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ CHAIN = (
     ("errors", "_core", "_version"),
     ("base",),
     ("mesh",),
-    ("samples", "io", "forms", "measures"),
+    ("samples", "io", "forms", "measures", "deformation"),
     ("homology", "maps"),
     ("conformal", "certificate", "partitions", "preparation"),
     ("area",),

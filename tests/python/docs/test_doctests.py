@@ -12,7 +12,7 @@ import pytest
 
 import stretchmap
 from computed_once import computed_once
-from stretchmap.population import pose
+from stretchmap.deformation import pose
 
 OPTIONAL = {"plot": ("matplotlib",), "cli": ("typer",), "preparation": ("gpytoolbox", "tetgen")}
 

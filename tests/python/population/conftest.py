@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from computed_once import computed_once
-from stretchmap.population import pose
+from stretchmap.deformation import pose
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 import stretchmap as sm
 from population.truth import correspondence_errors, size
+from stretchmap.deformation.fitting import Anchors, Template, fit_surface
+from stretchmap.deformation.pose import rigid_poses
+from stretchmap.deformation.similarity import similarity_onto
+from stretchmap.deformation.thin_plate import ThinPlate
 from stretchmap.population import correspond
 from stretchmap.population.correspondence import _eased
-from stretchmap.population.fitting import Anchors, Template, fit_surface
-from stretchmap.population.pose import rigid_poses
-from stretchmap.population.procrustes import similarity_onto
-from stretchmap.population.thin_plate import ThinPlate
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from stretchmap.deformation.similarity import similarity_onto
 from stretchmap.errors import ArrayError, DegenerateError, NonFiniteError, OptionError
 from stretchmap.population import generalized_procrustes, shape_model
-from stretchmap.population.procrustes import similarity_onto
 
 RNG = np.random.default_rng(13)
 

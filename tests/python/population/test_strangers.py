@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import stretchmap as sm
+from stretchmap.deformation import pose
+from stretchmap.deformation.fitting import Anchors, Template
+from stretchmap.deformation.pose import looks_mirrored, rigid_poses
 from stretchmap.errors import LandmarkError
-from stretchmap.population import correspond, pose
-from stretchmap.population.fitting import Anchors, Template
-from stretchmap.population.pose import looks_mirrored, rigid_poses
+from stretchmap.population import correspond
 
 SIDES = np.array([-1.0, 1.0, 1.0])
 

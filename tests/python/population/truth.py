@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import subspace_angles
 
 from stretchmap import _core
-from stretchmap.population.procrustes import similarity_onto
+from stretchmap.deformation.similarity import similarity_onto
 
 
 def size(points):

@@ -10,6 +10,7 @@ import pytest
 import stretchmap as sm
 from stretchmap import samples
 from stretchmap.errors import LandmarkError
+from stretchmap.registration import boundary
 from stretchmap.registration import map as _map
 from stretchmap.registration.flat_torus import FlatSurface
 from stretchmap.registration.match import match_surfaces
@@ -59,7 +60,7 @@ def test_where_faces_have_no_room_edges_are_halved(solid, flat, seed):
 
 def test_the_time_limit_counts_what_the_boundary_takes(solid, monkeypatch):
     given = []
-    fill, match = _map.fill_either_way, _map.match_surfaces
+    fill, match = _map.fill_either_way, boundary.match_surfaces
 
     def burns(*args, **options):
         end = time.thread_time() + 0.5
@@ -67,11 +68,11 @@ def test_the_time_limit_counts_what_the_boundary_takes(solid, monkeypatch):
             pass
         return match(*args, **options)
 
-    def filled(source, target, embedded, gauge, options, budget, progress):
+    def filled(source, target, laid, ways, options, budget, progress):
         given.append((budget.left, budget.seconds))
-        return fill(source, target, embedded, gauge, options, budget, progress)
+        return fill(source, target, laid, ways, options, budget, progress)
 
-    monkeypatch.setattr(_map, "match_surfaces", burns)
+    monkeypatch.setattr(boundary, "match_surfaces", burns)
     monkeypatch.setattr(_map, "fill_either_way", filled)
     sm.register(solid, solid)
     assert given[0][0] < given[0][1] - 0.5

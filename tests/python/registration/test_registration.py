@@ -160,8 +160,8 @@ def test_the_gauge_is_recovered(pair):
     for sign, twist, shift in [(1, 0, (0.3, 0.6)), (-1, 1, (0.0, 0.25)), (-1, -1, (0.7, 0.1))]:
         moved = flat.changed(Gauge(sign, twist, shift, 0.0, ""))
         ids = np.arange(0, pair.source.surface.n_vertices, 29, dtype=np.int32)
-        for marks in (None, np.stack([ids, ids], axis=1)):
-            found = choose_gauge(flat, moved, marks)
+        for belong in (None, (ids, pair.source.surface.V[ids])):
+            found = choose_gauge(flat, moved, belong)
             assert (found.sign, found.twist) == (sign, twist)
             off = np.array(found.shift) - shift
             assert np.abs(off - np.round(off)).max() < 2e-3

@@ -84,6 +84,10 @@ class Template:
         """Of the spline, at the surface's vertices."""
         return self.spline.features(self.solid.surface.V)
 
+    def deformed(self, points: Array, coefficients: Array) -> Array:
+        """Where the spline takes points (k, 3)."""
+        return np.asarray(points + self.spline.features(points) @ coefficients)
+
     @cached_property
     def coarse(self) -> Template:
         """The same with a spline of few sites."""
@@ -105,8 +109,10 @@ class Fit:
 
     Attributes
     ----------
+    coefficients : ndarray, shape (m + 4, 3)
+        Of the spline.
     points : ndarray, shape (n, 3)
-        Where the spline takes the template's vertices.
+        Where it takes the template's vertices.
     projected : ndarray, shape (nb, 3)
         The closest points of the goal.
     distance : float
@@ -115,6 +121,7 @@ class Fit:
         Of bending and distance: the least of several fits is the one to be believed.
     """
 
+    coefficients: Array
     points: Array
     projected: Array
     distance: float
@@ -191,12 +198,12 @@ def _drawn(
 
 def _fit(template: Template, side: _Side, coefficients: Array) -> Fit:
     solid, spline = template.solid, template.spline
-    points = solid.V + spline.features(solid.V) @ coefficients
+    points = template.deformed(solid.V, coefficients)
     skin = np.ascontiguousarray(points[solid.boundary_vertices])
     projected = side.tree.closest(skin)[0]
     square = float(((projected - skin) ** 2).sum(axis=1).mean())
     bending = float(np.einsum("rk,rs,sk->", coefficients, spline.bending, coefficients))
-    return Fit(points, projected, math.sqrt(square), square + _STIFFNESS[0] * bending)
+    return Fit(coefficients, points, projected, math.sqrt(square), square + _STIFFNESS[0] * bending)
 
 
 class _Side:

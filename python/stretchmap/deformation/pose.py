@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from .. import _core
 from ..base.rotation import kabsch
 from ..mesh.meshes import TriMesh
-from .procrustes import Similarity
+from .similarity import Similarity
 
 __all__ = ["looks_mirrored", "rigid_poses", "same_pose"]
 
