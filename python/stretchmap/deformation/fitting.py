@@ -24,6 +24,7 @@ __all__ = ["Anchors", "Fit", "Template", "fit_surface"]
 _SITES, _FEW_SITES = 100, 40  # of the spline, and of one for a first look
 # Weights of the bending energy, one after the other, against the mean square distance.
 _STIFFNESS = (1e-3, 1e-4, 1e-5)
+_POINTS = 1000  # of either surface, at least, that draw: ten a site
 _STEPS = 12  # most with each
 _AT_REST = 2e-4  # a step that moves by less, over the size, is the last
 _SAME_WAY = 0.5  # least cosine between normals of points drawn to each other
@@ -260,22 +261,31 @@ def _guess(template: Template, displacements: Array) -> Array:
 
 def _draw(equations: _Equations, template: Template, moved: _Side, goal: _Side) -> None:
     """Pairs of closest points, from the moved template to the goal and back."""
-    rest, features = template.solid.surface.V, template.features
-    total = len(moved.V) + len(goal.V)
-    feet, faces, weights = goal.tree.closest(moved.V)
+    ours, theirs = _some(len(moved.V)), _some(len(goal.V))
+    surface, features = template.solid.surface.V, template.features
+    rest, points, total = surface[ours], goal.V[theirs], len(moved.V) + len(goal.V)
+    share = len(moved.V) / total
+    feet, faces, weights = goal.tree.closest(moved.V[ours])
     normals = _unit(np.einsum("nk,nkx->nx", weights, goal.normals[goal.F[faces]]))
-    near = np.einsum("nx,nx->n", normals, moved.normals) > _SAME_WAY
+    near = np.einsum("nx,nx->n", normals, moved.normals[ours]) > _SAME_WAY
     gaps = np.einsum("nx,nx->n", normals, feet - rest)
-    equations.draw(features[near], normals[near], gaps[near], 1.0 / total)
+    equations.draw(features[ours[near]], normals[near], gaps[near], share / len(ours))
 
-    _, faces, weights = moved.tree.closest(goal.V)
+    _, faces, weights = moved.tree.closest(points)
     corners = moved.F[faces]
     normals = _unit(np.einsum("nk,nkx->nx", weights, moved.normals[corners]))
-    near = np.einsum("nx,nx->n", normals, goal.normals) > _SAME_WAY
-    corners, weights, normals = corners[near], weights[near], goal.normals[near]
-    gaps = goal.V[near] - np.einsum("nk,nkx->nx", weights, rest[corners])
+    near = np.einsum("nx,nx->n", normals, goal.normals[theirs]) > _SAME_WAY
+    corners, weights, normals = corners[near], weights[near], goal.normals[theirs[near]]
+    gaps = points[near] - np.einsum("nk,nkx->nx", weights, surface[corners])
     there = np.einsum("nk,nkr->nr", weights, features[corners])
-    equations.draw(there, normals, np.einsum("nx,nx->n", normals, gaps), 1.0 / total)
+    equations.draw(
+        there, normals, np.einsum("nx,nx->n", normals, gaps), (1.0 - share) / len(theirs)
+    )
+
+
+def _some(count: int) -> NDArray[np.intp]:
+    """Ids of vertices that stand for all."""
+    return np.arange(0, count, max(1, count // _POINTS))
 
 
 def _unit(vectors: Array) -> Array:

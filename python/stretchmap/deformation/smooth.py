@@ -25,6 +25,7 @@ def smooth_deformation(
     solid: TetMesh,
     start: Array | None = None,
     landmarks: Array | None = None,
+    most: int | None = None,
 ) -> tuple[Similarity, Fit]:
     """Lay a template's surface onto that of a solid.
 
@@ -37,6 +38,8 @@ def smooth_deformation(
         solid by landmarks, if there are three or more, or by the surfaces as rigid bodies.
     landmarks : ndarray, shape (l, 3), optional
         Where the landmarks of the template lie on the solid.
+    most : int, optional
+        Of several poses at most so many are followed to the end, those that take least at first.
 
     Returns
     -------
@@ -48,7 +51,8 @@ def smooth_deformation(
     starts = _starts(template, solid, start, landmarks)
     if len(starts) > 1:
         coarse = [_fitted(template, solid, *s, landmarks, True).energy for s in starts]
-        starts = [s for s, e in zip(starts, coarse, strict=True) if e <= _NEARLY * min(coarse)]
+        order = sorted(range(len(starts)), key=lambda i: coarse[i])[:most]
+        starts = [starts[i] for i in order if coarse[i] <= _NEARLY * coarse[order[0]]]
     fits = [_fitted(template, solid, *s, landmarks) for s in starts]
     best = min(range(len(fits)), key=lambda i: fits[i].energy)
     return starts[best][0], fits[best]

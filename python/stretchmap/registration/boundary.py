@@ -35,7 +35,7 @@ __all__ = ["BoundaryWays", "Laid"]
 _log = logging.getLogger("stretchmap")
 
 # Energy of a matching from which on it is doubted: up to 0.17 between vertebrae.
-_DOUBTFUL = 0.2
+_DOUBTFUL = 0.3
 _HOPELESS = 5.0  # with more, faces cross by the thousand, and refining them only takes time
 _TIME = 0.3  # share of the time without which nothing else is tried
 
@@ -112,9 +112,9 @@ class BoundaryWays:
         self._goals = self._second.surface.V[self._pairs[:, 1]]
         self._smooth_left = landmark_map == "smooth"
 
-    def lay(self, budget: Budget) -> Laid:
+    def lay(self, budget: Budget) -> list[Laid]:
         """The first way, and the others as well if faces cross then, or the surfaces are distorted
-        much, or landmarks cannot be reached: the best one.
+        much, or landmarks cannot be reached; the best one first.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class BoundaryWays:
         else:
             if not found[0].serves:
                 found += self.others(budget)
-        return min(found, key=lambda way: way.rank)
+        return sorted(found, key=lambda way: way.rank)
 
     def others(self, budget: Budget) -> list[Laid]:
         """What the ways by space lead to, once and if there is time; may be empty."""
@@ -150,9 +150,9 @@ class BoundaryWays:
             found.append(self._matched(start.gauge, *start.turns()))
         except (LandmarkError, SolverError) as error:
             _log.info("%s", error)
-        if not any(not way.crosses for way in found):
+        if all(way.crosses for way in found):
             found.append(Laid(start.laid(self._goals), start.gauge, ()))
-        return found
+        return sorted(found, key=lambda way: way.rank)
 
     def _whole(self) -> Laid:
         """The flat torus of the source laid on that of the target by a gauge."""

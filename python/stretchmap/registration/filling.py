@@ -64,17 +64,17 @@ class _Trial(Budget):
 
     def __init__(self, whole: Budget, progress: Progress | None) -> None:
         super().__init__(_FIRST * whole.left)
-        self._whole, self._progress, self._goes_well = whole, progress, False
+        self._whole, self._progress, self.goes_well = whole, progress, False
 
     def note(self, stage: str, done: int, total: int, **values: float) -> None:
         """Progress of what is tried."""
-        self._goes_well = not values["flips"] and values["element_std"] < _FAR_OFF
+        self.goes_well = not values["flips"] and values["element_std"] < _FAR_OFF
         report(self._progress, stage, done, total, **values)
 
     @property
     def left(self) -> float:
         """Seconds."""
-        return self._whole.left if self._goes_well else super().left
+        return self._whole.left if self.goes_well else super().left
 
 
 def fill_boundary(
@@ -103,7 +103,7 @@ def fill_boundary(
 def fill_either_way(
     source: TetMesh,
     target: TetMesh,
-    laid: Laid,
+    waiting: list[Laid],
     ways: BoundaryWays,
     options: FillOptions,
     budget: Budget,
@@ -118,32 +118,35 @@ def fill_either_way(
     Parameters
     ----------
     source, target : TetMesh
-    laid : Laid
-        The source's boundary on the target's.
+    waiting : list of Laid
+        The source's boundary on the target's, what is to be tried first first.
     ways : BoundaryWays
     options : FillOptions
     budget : Budget
     progress : Progress or None
     """
     best: Filled | None = None
-    waiting = [laid]
-    while waiting:
-        way = min(waiting, key=lambda way: way.rank)
-        if not way.crosses:
-            trial = _Trial(budget, progress)
-            found = fill_boundary(
-                way.embedded, way.gauge, target, options,
-                pinned=np.zeros(0, np.int32), glide=True, budget=trial, progress=trial.note,
-            )  # fmt: skip
-            best = _better(best, found, target)
-            if best.outcome.converged or budget.left < _WORTH * budget.seconds:
-                return best
-        waiting = ways.others(budget)
-    _log.info("once more, by way of the solid torus")
-    begin = composed(source, target, options, budget.share(_MAPS), progress)
-    if begin is not None:
-        outcome = solve(begin.problem, options, glide=True, budget=budget, progress=progress)
-        best = _better(best, Filled(begin.boundary, begin.gauge, outcome), target)
+    goes_well = short = False
+    while waiting := [way for way in waiting if not way.crosses] or ways.others(budget):
+        way, *waiting = waiting
+        if way.crosses:
+            continue
+        trial = _Trial(budget, progress)
+        found = fill_boundary(
+            way.embedded, way.gauge, target, options,
+            pinned=np.zeros(0, np.int32), glide=True, budget=trial, progress=trial.note,
+        )  # fmt: skip
+        best = _better(best, found, target)
+        goes_well = best.outcome.converged or trial.goes_well
+        short = budget.left < _WORTH * budget.seconds
+        if goes_well or short:
+            break
+    if not goes_well and not short:
+        _log.info("once more, by way of the solid torus")
+        begin = composed(source, target, options, budget.share(_MAPS), progress)
+        if begin is not None:
+            outcome = solve(begin.problem, options, glide=True, budget=budget, progress=progress)
+            best = _better(best, Filled(begin.boundary, begin.gauge, outcome), target)
     if best is None or best.outcome.converged or budget.left < _WORTH * budget.seconds:
         return best
     outcome = solve(
@@ -155,6 +158,7 @@ def fill_either_way(
 
 
 def _better(one: Filled | None, other: Filled, target: TetMesh) -> Filled:
+    """The one with fewer inverted tets, or volumes kept better; of equals the first."""
     if one is None or other.rank(target.volume) < one.rank(target.volume):
         return other
     return one

@@ -220,9 +220,10 @@ def _least_distorted(
     rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
     weights = surface.face_areas / surface.area
     energy = _core.registration.flat_value(chart, turns, periods, rest, weights)
+    solver = DampedSolver()
     for _ in range(_FLAT_STEPS if math.isfinite(energy) else 0):
         gradient, hessian = _core.registration.flat_model(chart, turns, periods, rest, weights)
-        step, alpha = damped_solve(gradient, hessian).reshape(-1, 2), 1.0
+        step, alpha = solver.step(gradient, hessian).reshape(-1, 2), 1.0
         while alpha > _FLAT_SHORTEST:
             moved = turns + alpha * step
             value = _core.registration.flat_value(chart, moved, periods, rest, weights)
@@ -238,21 +239,32 @@ def _least_distorted(
     return turns
 
 
-def damped_solve(
-    gradient: NDArray[np.float64], hessian: sp.csr_matrix, *, tol: float = 0.0
-) -> NDArray[np.float64]:
-    """Newton step for a Hessian that is positive semi-definite only; by a factorization, or by
-    conjugate gradients to a relative residual of ``tol``. Where nothing is free it is empty."""
-    if not len(gradient):
-        return np.empty(0)
-    diagonal = hessian.diagonal()
-    matrix = (hessian + sp.diags(1e-6 * diagonal + 1e-12 * diagonal.mean())).tocsr()
-    matrix.sort_indices()
-    solver = _core.linalg.SpdSolver(matrix, "jacobi" if tol else "direct")
-    step, _ = solver.solve(
-        -gradient[:, None], np.zeros((len(gradient), 1)), tol=tol or 1e-10, must_converge=False
-    )
-    return np.asarray(step[:, 0])
+class DampedSolver:
+    """Newton steps for Hessians that are positive semi-definite only; by a factorization, analyzed
+    once as long as the pattern stays, or by conjugate gradients to a relative residual of ``tol``.
+    """
+
+    def __init__(self, tol: float = 0.0) -> None:
+        self._tol = tol
+        self._indices = np.empty(0, np.int32)
+        self._solver: _core.linalg.SpdSolver | None = None
+
+    def step(self, gradient: NDArray[np.float64], hessian: sp.csr_matrix) -> NDArray[np.float64]:
+        """(n,) for a gradient (n,); where nothing is free it is empty."""
+        if not len(gradient):
+            return np.empty(0)
+        diagonal = hessian.diagonal()
+        matrix = (hessian + sp.diags(1e-6 * diagonal + 1e-12 * diagonal.mean())).tocsr()
+        matrix.sort_indices()
+        if self._solver is not None and np.array_equal(matrix.indices, self._indices):
+            self._solver.refactor(matrix.data)
+        else:
+            self._indices = matrix.indices
+            kind = "jacobi" if self._tol else "direct"
+            self._solver = _core.linalg.SpdSolver(matrix, kind)
+        right, start = -gradient[:, None], np.zeros((len(gradient), 1))
+        step, _ = self._solver.solve(right, start, tol=self._tol or 1e-10, must_converge=False)
+        return np.asarray(step[:, 0])
 
 
 @dataclass(frozen=True)

@@ -119,10 +119,12 @@ def register(
     one that fits them best is taken; else the one in which the two surfaces differ least from
     similar shapes (rotation, translation, scale). Reflections are never used.
 
-    Without landmarks and with ``boundary="glide"``, where the surfaces laid on each other cross, or
-    two fifths of the time leave tets inverted or volumes far off, the volume map of the source,
-    then the inverse of the target's, is where the boundary glides from, if both can be had in time;
-    the better map is returned.
+    Where the surfaces laid on each other cross or are distorted much, or landmarks cannot be
+    reached, they are matched once more from where a smooth deformation in space takes the source
+    (a thin-plate spline, by iterative closest points). Without landmarks and with
+    ``boundary="glide"`` that is tried as well where two fifths of the time leave tets inverted or
+    volumes far off, and then the volume map of the source followed by the inverse of the target's,
+    if both can be had in time; the best map is returned.
 
     Examples
     --------
@@ -156,14 +158,15 @@ def register(
         ways = BoundaryWays(
             source, target, marks, landmark_map, max_iter=max_iter, tol=tol, progress=progress
         )
-        laid = ways.lay(budget)
+        waiting = ways.lay(budget)
+        laid = waiting[0]
     except LandmarkError as error:
         raise LandmarkError(f"{error}; {mirrored}" if mirrored else str(error), error.ids) from None
     embedded, gauge = laid.embedded, laid.gauge
     seconds["boundary"] = time.perf_counter() - clock
     clock, filled = time.perf_counter(), None
     if boundary == "glide" and not len(marks):
-        filled = fill_either_way(source, target, laid, ways, options, budget, progress)
+        filled = fill_either_way(source, target, waiting, ways, options, budget, progress)
     if filled is None:
         if len(embedded.crossings) and not keep_best:
             raise CertificationError(

@@ -22,10 +22,11 @@ from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.normals import vertex_normals
 from ..mesh.split_edges import SplitSolid
 from .embed import EmbeddedBoundary, crossing_faces, split_long_edges
-from .flat_torus import FlatSurface, Gauge, choose_gauge, damped_solve
+from .flat_torus import DampedSolver, FlatSurface, Gauge, choose_gauge
 
 __all__ = ["SmoothStart"]
 
+_POSES = 2  # that are followed to the end
 _SAMPLE = 300  # vertices the gauge is chosen by
 # Weights, one after the other, of squared distances over the target's area against what it costs to
 # bend the flat torus.
@@ -86,7 +87,7 @@ class SmoothStart:
         marks = target.surface.V[pairs[:, 1]] if len(pairs) else None
         anchors = Anchors.of(source.surface, source.surface.V[held]) if len(pairs) else None
         template = Template(source, anchors)
-        pose, fit = smooth_deformation(template, target, landmarks=marks)
+        pose, fit = smooth_deformation(template, target, landmarks=marks, most=_POSES)
         ids = np.arange(0, flat.surface.n_vertices, max(1, flat.surface.n_vertices // _SAMPLE))
         there = pose(fit.points[source.boundary_vertices[ids]])
         gauge = choose_gauge(flat, second, (ids, there), "smooth fit")
@@ -139,14 +140,14 @@ def _drawn(
         bent = _core.registration.flat_value(chart, y, plane, rest, areas)
         return bent + 0.5 * pull * float(np.einsum("ni,nij,nj->", gaps, metric, gaps))
 
-    rows = np.arange(len(y) + 1)
+    rows, solver = np.arange(len(y) + 1), DampedSolver()
     for pull in _PULLS:
         drawing = sp.bsr_matrix((pull * metric, rows[:-1], rows))
         before = energy(y)
         for _ in range(_STEPS):
             gradient, hessian = _core.registration.flat_model(chart, y, plane, rest, areas)
             gradient = gradient - drawing @ wrapped(goals - y).ravel()
-            step = damped_solve(gradient, (hessian + drawing).tocsr()).reshape(-1, 2)
+            step = solver.step(gradient, (hessian + drawing).tocsr()).reshape(-1, 2)
             alpha = 1.0
             while alpha > _SHORTEST and not energy(y + alpha * step) < before:
                 alpha *= 0.5

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .flat_torus import FlatSurface, damped_solve
+from .flat_torus import DampedSolver, FlatSurface
 
 __all__ = ["SurfaceProblem"]
 
@@ -77,11 +77,11 @@ class SurfaceProblem:
         )
         gradient, hessian = gradient + cover[0], (hessian + cover[1]).tocsr()
         if wish is None and not self.held.any():  # only to lead there, or to where landmarks go
-            return damped_solve(gradient, hessian, tol=_CG_TOL).reshape(-1, 2)
+            return DampedSolver(_CG_TOL).step(gradient, hessian).reshape(-1, 2)
         free = np.flatnonzero(np.repeat(~self.held, 2))
         step = np.zeros(2 * len(y)) if wish is None else wish.ravel().copy()
         pull = gradient if wish is None else hessian @ step
-        step[free] = damped_solve(pull[free], hessian[free][:, free])
+        step[free] = DampedSolver().step(pull[free], hessian[free][:, free])
         return step.reshape(-1, 2)
 
     def unfolded(self, y: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:

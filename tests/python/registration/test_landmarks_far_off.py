@@ -68,9 +68,9 @@ def test_the_time_limit_counts_what_the_boundary_takes(solid, monkeypatch):
             pass
         return match(*args, **options)
 
-    def filled(source, target, laid, ways, options, budget, progress):
+    def filled(source, target, waiting, ways, options, budget, progress):
         given.append((budget.left, budget.seconds))
-        return fill(source, target, laid, ways, options, budget, progress)
+        return fill(source, target, waiting, ways, options, budget, progress)
 
     monkeypatch.setattr(boundary, "match_surfaces", burns)
     monkeypatch.setattr(_map, "fill_either_way", filled)
