@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..base.arrays import describe
 from ..base.options import memory, real
 from ..errors import GenusError, MissingDependencyError, SolverError
@@ -115,8 +116,14 @@ def _require_same_surface(solid: TetMesh, surface: TriMesh) -> None:
         )
     if not np.array_equal(solid.V[:n], surface.V):
         raise SolverError("filling the surface with tets moved its vertices")
-    if added := int((ids >= n).sum()):
-        raise SolverError(f"filling the surface with tets added {added} vertices to it")
+    added = solid.V[ids[ids >= n]]
+    if len(added):
+        faces = np.unique(_core.maps.SurfaceTree(surface.V, surface.F).closest(added)[1])
+        raise SolverError(
+            f"tetgen does not fill the surface without a new vertex on {describe('face', faces)}: "
+            "stretchmap.prepare remeshes it, and so fills it; or remesh it there",
+            faces.tolist(),
+        )
     missing = np.setdiff1d(np.arange(n), ids)
     if len(missing):
         _require_no_part_inside(surface, missing)

@@ -8,6 +8,7 @@ import pytest
 import stretchmap as sm
 from stretchmap.mesh import tetrahedralize as module
 from stretchmap.mesh.flat_tets import opened
+from stretchmap.mesh.split_edges import split_edges
 from stretchmap.samples.solids import cut_cells
 
 
@@ -23,6 +24,21 @@ def test_a_cavity_is_named_with_what_to_do():
         assert caught.value.ids == tuple(range(len(outer.F), len(surface.F)))
     left, _ = sm.TriMesh(surface.V, np.delete(surface.F, caught.value.ids, axis=0)).compact()
     assert sm.tetrahedralize(left).diagnose().ok
+
+
+def test_a_vertex_that_tetgen_adds_is_refused_with_the_face_it_lies_on(monkeypatch):
+    pytest.importorskip("tetgen")
+    solid = sm.samples.solid_torus(300)
+    surface, ids = solid.surface, solid.boundary_vertices
+    inner = np.setdiff1d(np.arange(solid.n_vertices), ids)
+    order = np.concatenate([ids, inner])  # as tetgen leaves them
+    solid = sm.TetMesh(solid.V[order], np.argsort(order)[solid.T].astype(np.int32))
+    edge = surface.F[7, :2]
+    split = split_edges(solid, edge[None].astype(np.int32), np.array([0.3])).solid
+    monkeypatch.setattr(module, "_run_tetgen", lambda *_: (split.V, split.T))
+    with pytest.raises(sm.errors.SolverError, match=r"new vertex on face \d+: .*prepare") as caught:
+        sm.tetrahedralize(surface)
+    assert np.isin(edge, surface.F[list(caught.value.ids)]).all()
 
 
 def box_with_flat_tets(step: int) -> sm.TetMesh:
