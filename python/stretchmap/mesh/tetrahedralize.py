@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -15,6 +12,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..base.arrays import describe
+from ..base.child import run_script
 from ..base.options import memory, real
 from ..errors import GenusError, MissingDependencyError, SolverError
 from .crossings import require_no_crossing
@@ -168,12 +166,7 @@ def _run_tetgen(
     )
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
-        run = subprocess.run(
-            [sys.executable, "-c", script, json.dumps(options)],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-        )
+        run = run_script(script, options, folder)
         if run.returncode != 0:
             raise SolverError(
                 "the surface cannot be filled with tets "

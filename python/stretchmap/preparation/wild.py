@@ -7,11 +7,9 @@ and need not be clean. What comes back has a boundary of its own, which does not
 from __future__ import annotations
 
 import importlib.util
-import json
 import math
 import re
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.child import run_script
 from ..errors import MeshError, MissingDependencyError, SolverError
 from ..mesh.meshes import TetMesh, TriMesh
 from .soup import labels
@@ -118,10 +117,7 @@ def run_ftetwild(
     with tempfile.TemporaryDirectory() as folder:
         np.savez(Path(folder, "surface.npz"), V=surface.V, F=surface.F)
         try:
-            run = subprocess.run(
-                [sys.executable, "-c", _SCRIPT, json.dumps(options)], timeout=seconds,
-                cwd=folder, capture_output=True, text=True, errors="replace", check=False,
-            )  # fmt: skip
+            run = run_script(_SCRIPT, options, folder, timeout=seconds)
         except subprocess.TimeoutExpired as error:
             raise SolverError(
                 f"fTetWild was not done with {surface.n_faces} faces after {seconds:.0f} seconds; "
