@@ -111,6 +111,7 @@ class BoundaryWays:
         self._second = split_long_edges(SplitSolid.of(target), second)[1]
         self._goals = self._second.surface.V[self._pairs[:, 1]]
         self._smooth_left = landmark_map == "smooth"
+        self._guess: NDArray[np.float64] | None = None
 
     def lay(self, budget: Budget) -> list[Laid]:
         """The first way, and the others as well if faces cross then, or the surfaces are distorted
@@ -141,7 +142,7 @@ class BoundaryWays:
         _log.info("the boundary once more, from a smooth deformation")
         try:
             start = SmoothStart.of(
-                self._source, self._target, self._flat, self._second, self._pairs
+                self._source, self._target, self._flat, self._second, self._pairs, self._guess
             )
         except (DegenerateError, SolverError) as error:
             _log.info("%s", error)
@@ -160,7 +161,10 @@ class BoundaryWays:
         belong = (pairs[:, 0], self._goals) if len(pairs) >= 3 else None
         gauge = choose_gauge(self._flat, self._second, belong)
         start = split_long_edges(SplitSolid.of(self._source), self._flat.changed(gauge))
-        return self._matched(gauge, *start)
+        laid = self._matched(gauge, *start)
+        if laid.history[-1].energy < _HOPELESS:
+            self._guess = laid.embedded.points[: self._source.surface.n_vertices]
+        return laid
 
     def _matched(self, gauge: Gauge, split: SplitSolid, first: FlatSurface) -> Laid:
         """The boundary after matching, from where it lies now."""

@@ -73,8 +73,11 @@ class SmoothStart:
         flat: FlatSurface,
         second: FlatSurface,
         pairs: NDArray[np.int32],
+        start: NDArray[np.float64] | None = None,
     ) -> SmoothStart:
-        """With landmarks (k, 2), surface vertices of source and target.
+        """With landmarks (k, 2), surface vertices of source and target; from the poses in which the
+        surfaces come closest as rigid bodies and from a first guess, if there is one, of where
+        boundary vertices go (nb, 3).
 
         Raises
         ------
@@ -87,18 +90,19 @@ class SmoothStart:
         marks = target.surface.V[pairs[:, 1]] if len(pairs) else None
         anchors = Anchors.of(source.surface, source.surface.V[held]) if len(pairs) else None
         template = Template(source, anchors)
-        pose, fit = smooth_deformation(template, target, landmarks=marks, most=_POSES)
+        pose, fit = smooth_deformation(template, target, start, marks, _POSES)
         ids = np.arange(0, flat.surface.n_vertices, max(1, flat.surface.n_vertices // _SAMPLE))
         there = pose(fit.points[source.boundary_vertices[ids]])
         gauge = choose_gauge(flat, second, (ids, there), "smooth fit")
         return cls(source, target, flat, second, held, template, pose, fit, gauge)
 
     def turns(self) -> tuple[SplitSolid, FlatSurface]:
-        """The source, boundary edges longer than half a turn halved, and its boundary near there
-        in the target's flat torus, free of folds."""
+        """The source, boundary edges halved that are longer than half a turn, and its boundary near
+        there in the target's flat torus, free of folds."""
         split, first = split_long_edges(SplitSolid.of(self.source), self.flat.changed(self.gauge))
         there = self.template.deformed(first.surface.V, self.fit.coefficients)
-        return split, first.at(_drawn(first, self.second, self.pose(there)))
+        drawn = first.at(_drawn(first, self.second, self.pose(there)))
+        return split_long_edges(split, drawn)  # which may have become longer
 
     def laid(self, marks: NDArray[np.float64]) -> EmbeddedBoundary:
         """The closest points of the target's surface, moved along it where faces cross; landmarks
