@@ -82,7 +82,11 @@ class VolumeMap(MapResult):
 
     @property
     def filled(self) -> float:
-        """Share of the torus' volume that the image fills; flat boundary faces cut off the rest."""
+        """What the image encloses over the torus' volume.
+
+        Flat boundary faces cut off the rest; where they span the hole they lie outside, so that it
+        may be a little more than 1.
+        """
         return self.distortion.image_total / self.torus.volume
 
     def extra_scalars(self) -> dict[str, Any]:
