@@ -34,8 +34,9 @@ __all__ = ["BoundaryWays", "Laid"]
 
 _log = logging.getLogger("stretchmap")
 
-# Energy of a matching from which on it is doubted: up to 0.17 between vertebrae.
-_DOUBTFUL = 0.3
+# Energy of a matching from which on it is doubted before it is tried: up to 0.17 between vertebrae,
+# and up to 0.4 as a rule good enough.
+_DOUBTFUL = 0.4
 _HOPELESS = 5.0  # with more, faces cross by the thousand, and refining them only takes time
 _TIME = 0.3  # share of the time without which nothing else is tried
 
