@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,8 +62,11 @@ class Laid:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """The better, the less."""
-        return self.crosses, self.history[-1].energy if self.history else math.inf
+        """The better, the less: whether faces cross, and the energy of the matching.
+
+        What a smooth deformation laid there by itself comes before what was matched.
+        """
+        return self.crosses, self.history[-1].energy if self.history else 0.0
 
     @property
     def serves(self) -> bool:
@@ -75,9 +77,9 @@ class Laid:
 class BoundaryWays:
     """The boundary of one solid laid on another's, in one way after the other.
 
-    First the flat tori are laid on each other whole, and matched; then the matching begins from
-    where a smooth deformation in space takes the source; and then its closest points count, as they
-    are.
+    First the flat tori are laid on each other whole, and matched; then the closest points count to
+    where a smooth deformation in space takes the source; and where these cross, the matching begins
+    from there.
 
     Parameters
     ----------
@@ -148,12 +150,12 @@ class BoundaryWays:
         except (DegenerateError, SolverError) as error:
             _log.info("%s", error)
             return found
-        try:
-            found.append(self._matched(start.gauge, *start.turns()))
-        except (LandmarkError, SolverError) as error:
-            _log.info("%s", error)
-        if all(way.crosses for way in found):
-            found.append(Laid(start.laid(self._goals), start.gauge, ()))
+        found.append(Laid(start.laid(self._goals), start.gauge, ()))
+        if found[0].crosses and budget.left > _TIME * budget.seconds:
+            try:
+                found.append(self._matched(start.gauge, *start.turns()))
+            except (LandmarkError, SolverError) as error:
+                _log.info("%s", error)
         return sorted(found, key=lambda way: way.rank)
 
     def _whole(self) -> Laid:

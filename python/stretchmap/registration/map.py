@@ -120,11 +120,11 @@ def register(
     similar shapes (rotation, translation, scale). Reflections are never used.
 
     Where the surfaces laid on each other cross or are distorted much, or landmarks cannot be
-    reached, they are matched once more from where a smooth deformation in space takes the source
-    (a thin-plate spline, by iterative closest points). Without landmarks and with
-    ``boundary="glide"`` that is tried as well where two fifths of the time leave tets inverted or
-    volumes far off, and then the volume map of the source followed by the inverse of the target's,
-    if both can be had in time; the best map is returned.
+    reached, the source goes where a smooth deformation in space takes it (a thin-plate spline, by
+    iterative closest points), or is matched once more from there if it crosses. Without landmarks
+    and with ``boundary="glide"`` that is tried as well where two fifths of the time leave tets
+    inverted or volumes far off, and then the volume map of the source followed by the inverse of
+    the target's, if both can be had in time; the best map is returned.
 
     Examples
     --------
