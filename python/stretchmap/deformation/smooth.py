@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.progress import Progress, report
 from ..mesh.meshes import TetMesh, TriMesh
 from .fitting import Fit, Template, fit_surface
 from .pose import rigid_poses, same_pose
@@ -26,6 +27,7 @@ def smooth_deformation(
     start: Array | None = None,
     landmarks: Array | None = None,
     most: int | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Similarity, Fit]:
     """Lay a template's surface onto that of a solid.
 
@@ -40,6 +42,8 @@ def smooth_deformation(
         Where the landmarks of the template lie on the solid.
     most : int, optional
         Of several poses at most so many are followed to the end, those that take least at first.
+    progress : Progress, optional
+        Called with stage ``"deform"`` before each fit.
 
     Returns
     -------
@@ -49,13 +53,21 @@ def smooth_deformation(
         In the pose of the template; of several poses the one of least energy.
     """
     starts = _starts(template, solid, start, landmarks)
+
+    def fits(coarse: bool) -> list[Fit]:
+        found = []
+        for i, begin in enumerate(starts):
+            report(progress, "deform", i, len(starts))
+            found.append(_fitted(template, solid, *begin, landmarks, coarse))
+        return found
+
     if len(starts) > 1:
-        coarse = [_fitted(template, solid, *s, landmarks, True).energy for s in starts]
-        order = sorted(range(len(starts)), key=lambda i: coarse[i])[:most]
-        starts = [starts[i] for i in order if coarse[i] <= _NEARLY * coarse[order[0]]]
-    fits = [_fitted(template, solid, *s, landmarks) for s in starts]
-    best = min(range(len(fits)), key=lambda i: fits[i].energy)
-    return starts[best][0], fits[best]
+        energies = [fit.energy for fit in fits(coarse=True)]
+        order = sorted(range(len(starts)), key=lambda i: energies[i])[:most]
+        starts = [starts[i] for i in order if energies[i] <= _NEARLY * energies[order[0]]]
+    fine = fits(coarse=False)
+    best = min(range(len(fine)), key=lambda i: fine[i].energy)
+    return starts[best][0], fine[best]
 
 
 def settled(
@@ -115,7 +127,7 @@ def _fitted(
     pose: Similarity,
     start: Array | None,
     landmarks: Array | None,
-    coarse: bool = False,
+    coarse: bool,
 ) -> Fit:
     """The fit in the pose of the template."""
     goal = TriMesh(pose.back(solid.surface.V), solid.surface.F)

@@ -48,12 +48,13 @@ class Laid:
     ----------
     embedded : EmbeddedBoundary
     gauge : Gauge
-    history : tuple of IterationRecord
+    energy : float
+        Of the matching; 0 of what a smooth deformation laid there by itself, which comes first.
     """
 
     embedded: EmbeddedBoundary
     gauge: Gauge
-    history: tuple[IterationRecord, ...]
+    energy: float
 
     @property
     def crosses(self) -> bool:
@@ -61,17 +62,14 @@ class Laid:
         return len(self.embedded.crossings) > 0
 
     @property
-    def rank(self) -> tuple[bool, float]:
-        """The better, the less: whether faces cross, and the energy of the matching.
-
-        What a smooth deformation laid there by itself comes before what was matched.
-        """
-        return self.crosses, self.history[-1].energy if self.history else 0.0
+    def rank(self) -> tuple[int, float]:
+        """The better, the less: pairs of faces that cross, then the energy."""
+        return len(self.embedded.crossings), self.energy
 
     @property
     def serves(self) -> bool:
         """Nothing speaks against it."""
-        return self.rank < (False, _DOUBTFUL)
+        return self.rank < (0, _DOUBTFUL)
 
 
 class BoundaryWays:
@@ -88,6 +86,11 @@ class BoundaryWays:
         Of volume vertices.
     landmark_map, max_iter, tol, progress
         As in `register`.
+
+    Attributes
+    ----------
+    history : tuple of IterationRecord
+        Of all matchings so far.
     """
 
     def __init__(
@@ -115,6 +118,7 @@ class BoundaryWays:
         self._goals = self._second.surface.V[self._pairs[:, 1]]
         self._smooth_left = landmark_map == "smooth"
         self._guess: NDArray[np.float64] | None = None
+        self.history: tuple[IterationRecord, ...] = ()
 
     def lay(self, budget: Budget) -> list[Laid]:
         """The first way, and the others as well if faces cross then, or the surfaces are distorted
@@ -145,12 +149,13 @@ class BoundaryWays:
         _log.info("the boundary once more, from a smooth deformation")
         try:
             start = SmoothStart.of(
-                self._source, self._target, self._flat, self._second, self._pairs, self._guess
-            )
+                self._source, self._target, self._flat, self._second, self._pairs,
+                self._guess, self._progress,
+            )  # fmt: skip
         except (DegenerateError, SolverError) as error:
             _log.info("%s", error)
             return found
-        found.append(Laid(start.laid(self._goals), start.gauge, ()))
+        found.append(Laid(start.laid(self._goals), start.gauge, 0.0))
         if found[0].crosses and budget.left > _TIME * budget.seconds:
             try:
                 found.append(self._matched(start.gauge, *start.turns()))
@@ -165,7 +170,7 @@ class BoundaryWays:
         gauge = choose_gauge(self._flat, self._second, belong)
         start = split_long_edges(SplitSolid.of(self._source), self._flat.changed(gauge))
         laid = self._matched(gauge, *start)
-        if laid.history[-1].energy < _HOPELESS:
+        if laid.energy < _HOPELESS:
             self._guess = laid.embedded.points[: self._source.surface.n_vertices]
         return laid
 
@@ -178,17 +183,19 @@ class BoundaryWays:
             _log.info("%s: once more with edges of the boundary halved", error)
             split, first = halve_edges_once(split, first)
             match = self._match(first)
+        self.history += match.history
         image, points = first.at(match.y), match.points
         if self._landmark_map == "affine":
             split, image = _bent(split, image, second, pairs)
             points = second.points(image.turns)
         points[pairs[:, 0]] = self._goals
-        if match.history[-1].energy < _HOPELESS:
+        energy = match.history[-1].energy
+        if energy < _HOPELESS:
             embedded = embed_boundary(split, second, image, points, pairs[:, 0])
         else:
             crossings = crossing_faces(points, split.solid.surface)
             embedded = EmbeddedBoundary(split, points, crossings)
-        return Laid(embedded, gauge, match.history)
+        return Laid(embedded, gauge, energy)
 
     def _match(self, first: FlatSurface) -> Match:
         held = self._pairs if self._landmark_map == "smooth" else self._pairs[:0]

@@ -191,7 +191,7 @@ def register(
     seconds["volume"] = time.perf_counter() - clock
     if not keep_best:
         require_certified(certificate, "the registration")
-    return _result(filled, certificate, target, marks, landmark_map, laid.history, seconds)
+    return _result(filled, certificate, target, marks, landmark_map, ways.history, seconds)
 
 
 def _landmarks(given: Any, source: TetMesh, target: TetMesh) -> Landmarks:

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .. import _core
+from ..base.progress import Progress
 from ..base.torus import wrapped
 from ..deformation.fitting import Anchors, Fit, Template
 from ..deformation.similarity import Similarity
@@ -73,7 +74,8 @@ class SmoothStart:
         flat: FlatSurface,
         second: FlatSurface,
         pairs: NDArray[np.int32],
-        start: NDArray[np.float64] | None = None,
+        start: NDArray[np.float64] | None,
+        progress: Progress | None,
     ) -> SmoothStart:
         """With landmarks (k, 2), surface vertices of source and target; from the poses in which the
         surfaces come closest as rigid bodies and from a first guess, if there is one, of where
@@ -90,7 +92,7 @@ class SmoothStart:
         marks = target.surface.V[pairs[:, 1]] if len(pairs) else None
         anchors = Anchors.of(source.surface, source.surface.V[held]) if len(pairs) else None
         template = Template(source, anchors)
-        pose, fit = smooth_deformation(template, target, start, marks, _POSES)
+        pose, fit = smooth_deformation(template, target, start, marks, _POSES, progress)
         ids = np.arange(0, flat.surface.n_vertices, max(1, flat.surface.n_vertices // _SAMPLE))
         there = pose(fit.points[source.boundary_vertices[ids]])
         gauge = choose_gauge(flat, second, (ids, there), "smooth fit")

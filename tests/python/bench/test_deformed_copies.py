@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import stretchmap as sm
@@ -34,6 +35,21 @@ def test_where_flat_tori_mislead_space_does_not(name, seed, back):
     source, target = reversed(pair(name, seed)) if back else pair(name, seed)
     result = sm.register(source, target, options=sm.FillOptions(time_limit=3e-3))
     assert result.certificate.certified
+    assert result.gauge.rule == "smooth fit"
+    assert result.distortion.element_error_mean < 0.08
+
+
+def test_landmarks_stay_where_they_belong():
+    from copies import deformed
+    from scipy.spatial import cKDTree
+
+    solid, copy = pair("bottles", 3603)
+    there = deformed(solid.surface.V, np.random.default_rng([3603, 17]))
+    rows = np.arange(0, len(there), len(there) // 8)
+    goals = copy.boundary_vertices[cKDTree(copy.surface.V).query(there[rows])[1]]
+    marks = (goals, solid.boundary_vertices[rows])
+    result = sm.register(copy, solid, marks, options=sm.FillOptions(time_limit=3e-3))
+    assert result.certificate.certified and result.landmark_error == 0.0
     assert result.gauge.rule == "smooth fit"
     assert result.distortion.element_error_mean < 0.08
 
