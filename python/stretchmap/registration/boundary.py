@@ -37,7 +37,8 @@ _log = logging.getLogger("stretchmap")
 # and up to 0.4 as a rule good enough.
 _DOUBTFUL = 0.4
 _HOPELESS = 5.0  # with more, faces cross by the thousand, and refining them only takes time
-_TIME = 0.3  # share of the time without which nothing else is tried
+# Shares of the time without which nothing else is tried, and nothing matched again.
+_TIME, _TO_MATCH = 0.3, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ class Laid:
     embedded : EmbeddedBoundary
     gauge : Gauge
     energy : float
-        Of the matching; 0 of what a smooth deformation laid there by itself, which comes first.
+        Distortion of the surfaces, that of the source's alone where nothing was matched.
     """
 
     embedded: EmbeddedBoundary
@@ -155,8 +156,10 @@ class BoundaryWays:
         except (DegenerateError, SolverError) as error:
             _log.info("%s", error)
             return found
-        found.append(Laid(start.laid(self._goals), start.gauge, 0.0))
-        if found[0].crosses and budget.left > _TIME * budget.seconds:
+        embedded, energy = start.laid(self._goals)
+        if energy < _HOPELESS:
+            found.append(Laid(embedded, start.gauge, energy))
+        if len(embedded.crossings) and budget.left > _TO_MATCH * budget.seconds:
             try:
                 found.append(self._matched(start.gauge, *start.turns()))
             except (LandmarkError, SolverError) as error:

@@ -106,16 +106,28 @@ class SmoothStart:
         drawn = first.at(_drawn(first, self.second, self.pose(there)))
         return split_long_edges(split, drawn)  # which may have become longer
 
-    def laid(self, marks: NDArray[np.float64]) -> EmbeddedBoundary:
-        """The closest points of the target's surface, moved along it where faces cross; landmarks
-        at ``marks`` (k, 3)."""
+    def laid(self, marks: NDArray[np.float64]) -> tuple[EmbeddedBoundary, float]:
+        """The closest points of the target's surface, moved along it where faces cross, landmarks
+        at ``marks`` (k, 3); and the distortion of faces, as the matching takes it."""
         goal = TriMesh(self.pose.back(self.target.surface.V), self.target.surface.F)
         points = np.array(self.fit.projected)
         points[self.held] = self.pose.back(marks)
         points = self.pose(settled(self.template, goal, points, self.held))
         points[self.held] = marks
         crossings = crossing_faces(points, self.source.surface)
-        return EmbeddedBoundary(SplitSolid.of(self.source), points, crossings)
+        embedded = EmbeddedBoundary(SplitSolid.of(self.source), points, crossings)
+        return embedded, _distortion(self.source.surface, self.target.surface, points)
+
+
+def _distortion(surface: TriMesh, target: TriMesh, points: NDArray[np.float64]) -> float:
+    """Mean over the area of ``|J|^2 / (2 det) + (det + 1 / det) / 2 - 2``, the areas made equal."""
+    F = surface.F
+    rest = _core.volume.rest_triangles(surface.V, F, target.area / surface.area).reshape(-1, 2, 2)
+    edges = np.stack([points[F[:, 1]] - points[F[:, 0]], points[F[:, 2]] - points[F[:, 0]]], -1)
+    gram = np.einsum("fki,fkj->fij", edges @ rest, edges @ rest)
+    det = np.maximum(np.sqrt(np.maximum(np.linalg.det(gram), 0.0)), 1e-12)
+    value = 0.5 * (np.trace(gram, axis1=1, axis2=2) / det + det + 1.0 / det) - 2.0
+    return float(np.average(value, weights=surface.face_areas))
 
 
 def _drawn(
