@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,7 +25,8 @@ _log = logging.getLogger("stretchmap")
 _SEM_STEPS = 10
 # Where faces begin next to nothing, far out on a limb, each step makes them a little larger only:
 # it takes up to a hundred, elsewhere twenty.
-_FLAT_STEPS, _FLAT_SHORTEST, _FLAT_TOL = 300, 1e-4, 1e-3
+_FLAT_STEPS, _FLAT_TOL = 300, 1e-3
+_SHORTEST = 1e-4  # of a Newton step
 _GRID = 20  # shifts tried along either coordinate
 _SAMPLE = 300  # vertices the rigid fit is judged by
 
@@ -219,21 +221,50 @@ def _least_distorted(
     periods = np.ascontiguousarray(lattice.T / math.sqrt(abs(np.linalg.det(lattice))))
     rest = _core.volume.rest_triangles(surface.V, surface.F, 1.0 / surface.area)
     weights = surface.face_areas / surface.area
-    energy = _core.registration.flat_value(chart, turns, periods, rest, weights)
-    solver = DampedSolver()
-    for _ in range(_FLAT_STEPS if math.isfinite(energy) else 0):
-        gradient, hessian = _core.registration.flat_model(chart, turns, periods, rest, weights)
-        step, alpha = solver.step(gradient, hessian).reshape(-1, 2), 1.0
-        while alpha > _FLAT_SHORTEST:
+    return descended(
+        lambda y: _core.registration.flat_value(chart, y, periods, rest, weights),
+        lambda y: _core.registration.flat_model(chart, y, periods, rest, weights),
+        turns,
+        steps=_FLAT_STEPS,
+        tol=_FLAT_TOL,
+    )
+
+
+def descended(
+    value: Callable[[NDArray[np.float64]], float],
+    model: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], sp.csr_matrix]],
+    turns: NDArray[np.float64],
+    *,
+    steps: int,
+    tol: float,
+) -> NDArray[np.float64]:
+    """Newton steps, halved until an energy falls, until one lowers it by no more than a share.
+
+    Parameters
+    ----------
+    value : callable
+        The energy, infinite where a face is folded; a start without one is returned.
+    model : callable
+        Gradient (2 n,) and Hessian, positive semi-definite.
+    turns : ndarray, shape (n, 2)
+    steps : int
+        Most of them.
+    tol : float
+        The share.
+    """
+    energy, solver = value(turns), DampedSolver()
+    for _ in range(steps if math.isfinite(energy) else 0):
+        step, alpha = solver.step(*model(turns)).reshape(-1, 2), 1.0
+        while alpha > _SHORTEST:
             moved = turns + alpha * step
-            value = _core.registration.flat_value(chart, moved, periods, rest, weights)
-            if value < energy:
+            lower = value(moved)
+            if lower < energy:
                 break
             alpha *= 0.5
         else:
             break
-        small = energy - value <= _FLAT_TOL * energy
-        turns, energy = moved, value
+        small = energy - lower <= tol * energy
+        turns, energy = moved, lower
         if small:
             break
     return turns

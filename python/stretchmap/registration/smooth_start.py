@@ -23,7 +23,7 @@ from ..mesh.meshes import TetMesh, TriMesh
 from ..mesh.normals import vertex_normals
 from ..mesh.split_edges import SplitSolid
 from .embed import EmbeddedBoundary, crossing_faces, split_long_edges
-from .flat_torus import DampedSolver, FlatSurface, Gauge, choose_gauge
+from .flat_torus import FlatSurface, Gauge, choose_gauge, descended
 
 __all__ = ["SmoothStart"]
 
@@ -32,7 +32,7 @@ _SAMPLE = 300  # vertices the gauge is chosen by
 # Weights, one after the other, of squared distances over the target's area against what it costs to
 # bend the flat torus.
 _PULLS = (10.0, 100.0, 1000.0)
-_STEPS, _SHORTEST, _TOL = 40, 1e-4, 1e-3
+_STEPS, _TOL = 40, 1e-3
 _SAME_WAY = 0.5  # least cosine between normals of a vertex and of the face it is drawn to
 
 
@@ -136,9 +136,8 @@ def _drawn(
     """Turns (n, 2): the flat torus of the source bent, without folds, until its vertices come close
     to those faces of the target that are closest to where they are in space, ``there`` (n, 3)."""
     surface, target = first.surface, second.surface
-    _, faces, weights = _core.maps.SurfaceTree(target.V, target.F).closest(
-        np.ascontiguousarray(there)
-    )
+    tree = _core.maps.SurfaceTree(target.V, target.F)
+    _, faces, weights = tree.closest(np.ascontiguousarray(there))
     goals = np.einsum("nk,nkj->nj", weights, second.corners(faces))
     normals = np.nan_to_num(vertex_normals(there, surface.F))
     sides = np.nan_to_num(vertex_normals(target.V, target.F))[target.F[faces]].sum(axis=1)
@@ -153,27 +152,22 @@ def _drawn(
     rest = np.ascontiguousarray(np.linalg.inv(edges).reshape(-1, 4))
     areas = 0.5 * np.linalg.det(edges)
 
-    def energy(y: NDArray[np.float64]) -> float:
-        gaps = wrapped(goals - y)
-        bent = _core.registration.flat_value(chart, y, plane, rest, areas)
-        return bent + 0.5 * pull * float(np.einsum("ni,nij,nj->", gaps, metric, gaps))
-
-    rows, solver = np.arange(len(y) + 1), DampedSolver()
-    for pull in _PULLS:
+    def bent(pull: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = np.arange(len(y) + 1)
         drawing = sp.bsr_matrix((pull * metric, rows[:-1], rows))
-        before = energy(y)
-        for _ in range(_STEPS):
+
+        def value(y: NDArray[np.float64]) -> float:
+            gaps = wrapped(goals - y).ravel()
+            drawn = 0.5 * float(np.einsum("n,n->", gaps, drawing @ gaps))
+            return drawn + _core.registration.flat_value(chart, y, plane, rest, areas)
+
+        def model(y: NDArray[np.float64]) -> tuple[NDArray[np.float64], sp.csr_matrix]:
             gradient, hessian = _core.registration.flat_model(chart, y, plane, rest, areas)
-            gradient = gradient - drawing @ wrapped(goals - y).ravel()
-            step = solver.step(gradient, (hessian + drawing).tocsr()).reshape(-1, 2)
-            alpha = 1.0
-            while alpha > _SHORTEST and not energy(y + alpha * step) < before:
-                alpha *= 0.5
-            if not alpha > _SHORTEST:
-                break
-            y = np.ascontiguousarray(y + alpha * step)
-            after = energy(y)
-            small, before = before - after <= _TOL * before, after
-            if small:
-                break
+            gaps = wrapped(goals - y).ravel()
+            return gradient - drawing @ gaps, (hessian + drawing).tocsr()
+
+        return descended(value, model, y, steps=_STEPS, tol=_TOL)
+
+    for pull in _PULLS:
+        y = bent(pull, y)
     return y
