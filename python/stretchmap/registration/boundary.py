@@ -36,7 +36,8 @@ _log = logging.getLogger("stretchmap")
 # Energy of a matching from which on it is doubted before it is tried: up to 0.17 between vertebrae,
 # and up to 0.4 as a rule good enough.
 _DOUBTFUL = 0.4
-_HOPELESS = 5.0  # with more, faces cross by the thousand, and refining them only takes time
+_HOPELESS = 5.0  # energy from which on it is not worth beginning from
+_VERY_MANY = 1000  # pairs of faces that cross: refining these only takes time
 # Shares of the time without which nothing else is tried, and nothing matched again.
 _TIME, _TO_MATCH = 0.3, 0.5
 
@@ -192,13 +193,11 @@ class BoundaryWays:
             split, image = _bent(split, image, second, pairs)
             points = second.points(image.turns)
         points[pairs[:, 0]] = self._goals
-        energy = match.history[-1].energy
-        if energy < _HOPELESS:
+        crossings = crossing_faces(points, split.solid.surface)
+        embedded = EmbeddedBoundary(split, points, crossings)
+        if len(crossings) < _VERY_MANY:
             embedded = embed_boundary(split, second, image, points, pairs[:, 0])
-        else:
-            crossings = crossing_faces(points, split.solid.surface)
-            embedded = EmbeddedBoundary(split, points, crossings)
-        return Laid(embedded, gauge, energy)
+        return Laid(embedded, gauge, match.history[-1].energy)
 
     def _match(self, first: FlatSurface) -> Match:
         held = self._pairs if self._landmark_map == "smooth" else self._pairs[:0]
