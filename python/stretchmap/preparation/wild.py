@@ -75,7 +75,7 @@ def fill_within_envelope(surface: TriMesh, edge: float) -> TetMesh:
     Returns
     -------
     TetMesh
-        One piece, the largest.
+        One piece, the largest. fTetWild makes other tets of the same surface each time.
 
     Raises
     ------

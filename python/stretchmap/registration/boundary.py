@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.budget import Budget
-from ..base.progress import Progress
+from ..base.budget import Budget, Spent
+from ..base.progress import Progress, report
 from ..errors import DegenerateError, LandmarkError, SolverError
 from ..maps.history import IterationRecord
 from ..mesh.meshes import TetMesh
@@ -38,8 +38,9 @@ _log = logging.getLogger("stretchmap")
 _DOUBTFUL = 0.4
 _HOPELESS = 5.0  # energy from which on it is not worth beginning from
 _VERY_MANY = 1000  # pairs of faces that cross: refining these only takes time
-# Shares of the time without which nothing else is tried, and nothing matched again.
-_TIME, _TO_MATCH = 0.3, 0.5
+# Shares of the time without which nothing else is tried, nothing matched again, and a deformation
+# not gone on with.
+_TIME, _TO_MATCH, _TO_FILL = 0.3, 0.5, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +150,19 @@ class BoundaryWays:
             return found
         self._smooth_left = False
         _log.info("the boundary once more, from a smooth deformation")
+
+        def note(stage: str, done: int, total: int, **values: float) -> None:
+            if budget.left < _TO_FILL * budget.seconds:
+                raise Spent
+            report(self._progress, stage, done, total, **values)
+
         try:
             start = SmoothStart.of(
                 self._source, self._target, self._flat, self._second, self._pairs,
-                self._guess, self._progress,
+                self._guess, note,
             )  # fmt: skip
+        except Spent:
+            return found
         except (DegenerateError, SolverError) as error:
             _log.info("%s", error)
             return found
