@@ -37,9 +37,12 @@ _log = logging.getLogger("stretchmap")
 # and up to 0.4 as a rule good enough.
 _DOUBTFUL = 0.4
 _HOPELESS = 5.0  # energy from which on it is not worth beginning from
+# Distortion of faces by a smooth deformation: up to 0.4 between solids and deformed copies, 1.7 and
+# more between solids that have little in common.
+_UNLIKE = 1.0
 _VERY_MANY = 1000  # pairs of faces that cross: refining these only takes time
-# Shares of the time without which nothing else is tried, nothing matched again, and a deformation
-# not gone on with.
+# Shares of the time without which nothing else is tried, nothing matched from a deformation that
+# leads nowhere near, and a deformation not gone on with.
 _TIME, _TO_MATCH, _TO_FILL = 0.3, 0.5, 0.15
 
 
@@ -167,9 +170,10 @@ class BoundaryWays:
             _log.info("%s", error)
             return found
         embedded, energy = start.laid(self._goals)
-        if energy < _HOPELESS:
+        if energy < _UNLIKE:
             found.append(Laid(embedded, start.gauge, energy))
-        if len(embedded.crossings) and budget.left > _TO_MATCH * budget.seconds:
+        least = _TIME if energy < _UNLIKE else _TO_MATCH
+        if len(embedded.crossings) and budget.left > least * budget.seconds:
             try:
                 found.append(self._matched(start.gauge, *start.turns()))
             except (LandmarkError, SolverError) as error:

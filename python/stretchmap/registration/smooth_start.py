@@ -33,6 +33,7 @@ _SAMPLE = 300  # vertices the gauge is chosen by
 # bend the flat torus.
 _PULLS = (10.0, 100.0, 1000.0)
 _STEPS, _TOL = 40, 1e-3
+_COLLAPSED = 10.0  # distortion of a face
 _SAME_WAY = 0.5  # least cosine between normals of a vertex and of the face it is drawn to
 
 
@@ -120,14 +121,15 @@ class SmoothStart:
 
 
 def _distortion(surface: TriMesh, target: TriMesh, points: NDArray[np.float64]) -> float:
-    """Mean over the area of ``|J|^2 / (2 det) + (det + 1 / det) / 2 - 2``, the areas made equal."""
+    """Mean over the area of ``|J|^2 / (2 det) + (det + 1 / det) / 2 - 2``, the areas made equal;
+    of faces that have next to collapsed no more than counts."""
     F = surface.F
     rest = _core.volume.rest_triangles(surface.V, F, target.area / surface.area).reshape(-1, 2, 2)
     edges = np.stack([points[F[:, 1]] - points[F[:, 0]], points[F[:, 2]] - points[F[:, 0]]], -1)
     gram = np.einsum("fki,fkj->fij", edges @ rest, edges @ rest)
     det = np.maximum(np.sqrt(np.maximum(np.linalg.det(gram), 0.0)), 1e-12)
     value = 0.5 * (np.trace(gram, axis1=1, axis2=2) / det + det + 1.0 / det) - 2.0
-    return float(np.average(value, weights=surface.face_areas))
+    return float(np.average(np.minimum(value, _COLLAPSED), weights=surface.face_areas))
 
 
 def _drawn(
