@@ -96,12 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
             script=Path(__file__).with_name("register_task.py"),
             again=options.again,
         )
-    failed = [r for r in records if not r["certified"]]
-    text = f"{report.table(records)}\nNot certified:\n\n{report.reasons(failed)}"
-    print(text)
-    if options.write:
-        report.put(ROOT / "docs" / "robustness.md", "registrations", text)
-    return int(bool(failed))
+    return report.finish(records, "registrations" if options.write else None)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import numpy as np
 
 Record = dict[str, Any]
 _LONGEST = 160  # characters of a reason
+_DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "robustness.md"
 
 
 def quantile(records: Iterable[Record], key: str, q: float) -> float:
@@ -68,6 +69,17 @@ def reasons(records: list[Record]) -> str:
         return "None.\n"
     rows = [[r["group"], r["name"], str(r.get("reason", ""))[:_LONGEST]] for r in records]
     return markdown(["", "seed or file", "reason"], rows)
+
+
+def finish(records: list[Record], section: str | None) -> int:
+    """Print the table and what is not certified, put both into a section of the documentation if
+    there is one, and return 1 if anything is not."""
+    failed = [r for r in records if not r["certified"]]
+    text = f"{table(records)}\nNot certified:\n\n{reasons(failed)}"
+    print(text)
+    if section is not None:
+        put(_DOCUMENT, section, text)
+    return int(bool(failed))
 
 
 def markdown(head: list[str], rows: list[list[str]]) -> str:

@@ -83,13 +83,10 @@ def main(arguments: list[str] | None = None) -> int:
         threads=threads,
         again=options.again,
     )
-    failed = [r for r in records if not r["certified"]]
-    text = f"{report.table(records)}\nNot certified:\n\n{report.reasons(failed)}"
-    print(text)
-    if options.write is not None:
-        section = options.write or f"{kind} {'files' if options.files else options.seeds}"
-        report.put(ROOT / "docs" / "robustness.md", section, text)
-    return int(bool(failed))
+    section = options.write
+    if section == "":
+        section = f"{kind} {'files' if options.files else options.seeds}"
+    return report.finish(records, section)
 
 
 if __name__ == "__main__":

@@ -149,13 +149,13 @@ class BoundaryWays:
     def others(self, budget: Budget) -> list[Laid]:
         """What the ways by space lead to, once and if there is time; may be empty."""
         found: list[Laid] = []
-        if not self._smooth_left or budget.left < _TIME * budget.seconds:
+        if not self._smooth_left or budget.left <= _TIME * budget.seconds:
             return found
         self._smooth_left = False
         _log.info("the boundary once more, from a smooth deformation")
 
         def note(stage: str, done: int, total: int, **values: float) -> None:
-            if budget.left < _TO_FILL * budget.seconds:
+            if budget.left <= _TO_FILL * budget.seconds:
                 raise Spent
             report(self._progress, stage, done, total, **values)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,8 +128,7 @@ def fill_either_way(
     """
     best: Filled | None = None
     goes_well = short = False
-    while waiting := [way for way in waiting if not way.crosses] or ways.others(budget):
-        way, *waiting = waiting
+    for way in _in_turn(waiting, ways, budget):
         if way.crosses:
             continue
         trial = _Trial(budget, progress)
@@ -155,6 +155,12 @@ def fill_either_way(
     history = best.outcome.history + outcome.history
     more = dataclasses.replace(best, outcome=dataclasses.replace(outcome, history=history))
     return more if more.rank(target.volume) <= best.rank(target.volume) else best
+
+
+def _in_turn(waiting: list[Laid], ways: BoundaryWays, budget: Budget) -> Iterator[Laid]:
+    """What was laid, then what other ways lead to, which is not looked for before."""
+    yield from waiting
+    yield from ways.others(budget)
 
 
 def _better(one: Filled | None, other: Filled, target: TetMesh) -> Filled:

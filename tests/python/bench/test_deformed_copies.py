@@ -29,7 +29,13 @@ def pair(name: str, seed: int) -> tuple[sm.TetMesh, sm.TetMesh]:
 
 @pytest.mark.parametrize(
     ("name", "seed", "back"),
-    [("even_tubes", 3602, True), ("bottles", 3603, False), ("bottles", 3603, True)],
+    [
+        ("even_tubes", 3602, True),
+        ("bottles", 3603, False),
+        ("bottles", 3603, True),
+        ("bottles", 4001, False),  # laid well enough, but stuck inside
+        ("drilled_even", 4102, True),  # the deformation crosses
+    ],
 )
 def test_where_flat_tori_mislead_space_does_not(name, seed, back):
     source, target = reversed(pair(name, seed)) if back else pair(name, seed)
