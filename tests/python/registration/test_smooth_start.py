@@ -98,9 +98,9 @@ def test_distortion_is_that_of_shapes_and_shares_of_area(solid):
 def test_steps_are_those_of_a_solver_that_begins_anew():
     """Of the same pattern with other values, and of another one with as many entries."""
     rng = np.random.default_rng(0)
-    kept, some = DampedSolver(), sp.random(40, 40, 0.1, random_state=7)
+    kept, some = DampedSolver(), sp.random(40, 40, 0.1, "csr", random_state=7)
     for order in (np.arange(40), np.arange(40), rng.permutation(40)):
-        A = some[order][:, order].tocsr()
+        A = some[order][:, order]
         A.data = rng.standard_normal(A.nnz)
         H, g = (A @ A.T + sp.eye(40)).tocsr(), rng.standard_normal(40)
         step = kept.step(g, H)
