@@ -24,7 +24,6 @@ __all__ = ["Anchors", "Fit", "Template", "fit_surface"]
 _SITES, _FEW_SITES = 100, 40  # of the spline, and of one for a first look
 # Weights of the bending energy, one after the other, against the mean square distance.
 _STIFFNESS = (1e-3, 1e-4, 1e-5)
-_POINTS = 1000  # of either surface, at least, that draw: ten a site
 _STEPS = 12  # most with each
 _AT_REST = 2e-4  # a step that moves by less, over the size, is the last
 _SAME_WAY = 0.5  # least cosine between normals of points drawn to each other
@@ -69,11 +68,16 @@ class Template:
         Its landmarks.
     n_sites : int
         Of the spline.
+    n_points : int or None
+        Vertices of either surface, at least, that draw, evenly spread over their rows; all without.
+        With ten a site correspondences of a population are off by 0.11 % of the size instead of
+        0.10 %.
     """
 
     solid: TetMesh
     anchors: Anchors | None = None
     n_sites: int = _SITES
+    n_points: int | None = None
 
     @cached_property
     def spline(self) -> ThinPlate:
@@ -92,7 +96,7 @@ class Template:
     @cached_property
     def coarse(self) -> Template:
         """The same with a spline of few sites."""
-        return Template(self.solid, self.anchors, _FEW_SITES)
+        return Template(self.solid, self.anchors, _FEW_SITES, self.n_points)
 
     @cached_property
     def ring_mean(self) -> sp.csr_matrix:
@@ -261,7 +265,7 @@ def _guess(template: Template, displacements: Array) -> Array:
 
 def _draw(equations: _Equations, template: Template, moved: _Side, goal: _Side) -> None:
     """Pairs of closest points, from the moved template to the goal and back."""
-    ours, theirs = _some(len(moved.V)), _some(len(goal.V))
+    ours, theirs = (_some(len(side.V), template.n_points) for side in (moved, goal))
     surface, features = template.solid.surface.V, template.features
     rest, points, total = surface[ours], goal.V[theirs], len(moved.V) + len(goal.V)
     share = len(moved.V) / total
@@ -283,9 +287,9 @@ def _draw(equations: _Equations, template: Template, moved: _Side, goal: _Side) 
     )
 
 
-def _some(count: int) -> NDArray[np.intp]:
+def _some(count: int, wanted: int | None) -> NDArray[np.intp]:
     """Ids of vertices that stand for all."""
-    return np.arange(0, count, max(1, count // _POINTS))
+    return np.arange(0, count, 1 if wanted is None else max(1, count // wanted))
 
 
 def _unit(vectors: Array) -> Array:

@@ -27,6 +27,7 @@ from .flat_torus import FlatSurface, Gauge, choose_gauge, descended
 
 __all__ = ["SmoothStart"]
 
+_POINTS = 1000  # of either surface that draw: about ten a site
 _POSES = 2  # that are followed to the end
 _SAMPLE = 300  # vertices the gauge is chosen by
 # Weights, one after the other, of squared distances over the target's area against what it costs to
@@ -92,7 +93,7 @@ class SmoothStart:
         held = pairs[:, 0]
         marks = target.surface.V[pairs[:, 1]] if len(pairs) else None
         anchors = Anchors.of(source.surface, source.surface.V[held]) if len(pairs) else None
-        template = Template(source, anchors)
+        template = Template(source, anchors, n_points=_POINTS)
         pose, fit = smooth_deformation(template, target, start, marks, _POSES, progress)
         ids = np.arange(0, flat.surface.n_vertices, max(1, flat.surface.n_vertices // _SAMPLE))
         there = pose(fit.points[source.boundary_vertices[ids]])
